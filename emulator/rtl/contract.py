@@ -127,7 +127,7 @@ class RtlEngine(ABC):
 
     @property
     def stride_clocks(self) -> int:
-        """Number of clocks that ran within strides; see ``hdl.blocks.stride``."""
+        """Number of clocks that ran within strides; see ``hdl.blocks.pinned``."""
         return 0
 
     def use_strides(self, on: bool) -> None:

@@ -26,7 +26,7 @@ from cubestack.firmware_model.interface.pins import resized
 from cubestack.hdl.blocks.pinned import PinnedComponent
 from cubestack.hdl.cubesense.dataflow import Side, check_side
 from cubestack.hdl.cubesense.sun_search import SunSearch
-from cubestack.hdl.cubesense.writer import add_writer
+from cubestack.hdl.cubesense.top import add_writer
 
 
 class CubeSenseI2cFpga(PinnedComponent):

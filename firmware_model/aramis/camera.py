@@ -9,8 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.aramis.hardware import AramisHardware, FrameEnd
-from cubestack.firmware_model.aramis.memory import PICTURES_AT
+from cubestack.firmware_model.aramis.hardware import PICTURES_AT, AramisHardware, FrameEnd
 from cubestack.firmware_model.aramis.state import State
 from cubestack.firmware_model.interface.aramis import IMAGE_BYTES, Reason
 from cubestack.firmware_model.interface.cameras import mt9m001

@@ -18,8 +18,7 @@ from cubestack.firmware_model.interface.aramis import BLOCK_BYTES, CatalogueStat
 from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import ReadTimer, Routine
-from cubestack.firmware_model.node.commands import CommandExecutor
-from cubestack.firmware_model.node.queue import QueuedCommand
+from cubestack.firmware_model.node.commands import CommandExecutor, QueuedCommand
 
 STREAM_BACKLOG_BYTES = 4 * BLOCK_BYTES
 

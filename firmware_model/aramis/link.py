@@ -12,8 +12,8 @@ from cubestack.firmware_model.aramis.state import State
 from cubestack.firmware_model.interface.aramis import BLOCK_BYTES, INTERFACE
 from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.node.commands import QueuedCommand
 from cubestack.firmware_model.node.link import BusFlags, LinkFlags, QueueingLink
-from cubestack.firmware_model.node.queue import QueuedCommand
 
 SEND_BUFFER_BYTES = 8 * BLOCK_BYTES  #: assumed
 

@@ -14,8 +14,7 @@ from cubestack.firmware_model.aramis import pipeline
 from cubestack.firmware_model.aramis.arrays import Floats
 from cubestack.firmware_model.aramis.camera import Camera
 from cubestack.firmware_model.aramis.catalogue.flash_store import CatalogueStore
-from cubestack.firmware_model.aramis.detection.background import LevelHistory
-from cubestack.firmware_model.aramis.detection.spikes import SpikeRemoval
+from cubestack.firmware_model.aramis.detection.mask import LevelHistory, SpikeRemoval
 from cubestack.firmware_model.aramis.field import FOV_DEG, CameraField
 from cubestack.firmware_model.aramis.settings import StoredSettings
 from cubestack.firmware_model.aramis.state import MeasurementResult, State

@@ -12,11 +12,14 @@ from numpy.typing import NDArray
 from cubestack.firmware_model.aramis.arrays import Floats, Mask
 from cubestack.firmware_model.aramis.catalogue.database import Database
 from cubestack.firmware_model.aramis.detection import charges
-from cubestack.firmware_model.aramis.detection.background import LevelHistory
+from cubestack.firmware_model.aramis.detection.mask import (
+    HALF,
+    LevelHistory,
+    SpikeRemoval,
+    remove_spikes,
+)
 from cubestack.firmware_model.aramis.detection.regions import NO_REGIONS, find_regions, locate_stars
-from cubestack.firmware_model.aramis.detection.smear import smear_px, without_tracks
-from cubestack.firmware_model.aramis.detection.spikes import HALF, SpikeRemoval, remove_spikes
-from cubestack.firmware_model.aramis.detection.spots import find_spots
+from cubestack.firmware_model.aramis.detection.spots import find_spots, smear_px, without_tracks
 from cubestack.firmware_model.aramis.field import CameraField
 from cubestack.firmware_model.aramis.matching.identification import identify
 from cubestack.firmware_model.aramis.solution import (

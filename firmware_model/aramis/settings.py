@@ -10,8 +10,8 @@ from zlib import crc32
 
 from cubestack.firmware_model.interface.aramis import INTERFACE
 from cubestack.firmware_model.interface.aramis.telemetry import SETTINGS_SHOWN
-from cubestack.firmware_model.mcu.flash_store import FlashStore
-from cubestack.firmware_model.node.settings import Settings
+from cubestack.firmware_model.mcu.memory import FlashStore
+from cubestack.firmware_model.node.state import Settings
 
 #: Telecommands whose parameters are stored.
 SETTING_COMMANDS = tuple(SETTINGS_SHOWN.values())

@@ -7,11 +7,10 @@ from cubestack.firmware_model.aramis.settings import StoredSettings
 from cubestack.firmware_model.aramis.solution import Solution
 from cubestack.firmware_model.interface import aramis
 from cubestack.firmware_model.interface.aramis import MS_PER_DAY, MeasurementOutcome, SensorState
-from cubestack.firmware_model.interface.aramis.flags import FLAG_NAMES
 from cubestack.firmware_model.interface.aramis.switches import DEFAULT_SWITCHES, AramisSwitches
-from cubestack.firmware_model.mcu.flash_store import FlashStore
-from cubestack.firmware_model.node.state import NodeState
-from cubestack.firmware_model.node.switches import RunningSwitches
+from cubestack.firmware_model.interface.aramis.telemetry import FLAG_NAMES
+from cubestack.firmware_model.mcu.memory import FlashStore
+from cubestack.firmware_model.node.state import NodeState, RunningSwitches
 
 
 class Clock:

@@ -21,7 +21,7 @@ from cubestack.firmware_model.interface.codec.attitude_quality import UNRATED
 from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.interface.codec.switch_messages import SHOWN, shown_values
 from cubestack.firmware_model.mcu.costs import Meter
-from cubestack.firmware_model.node.identification import SERIAL_NUMBER, identification
+from cubestack.firmware_model.node.state import SERIAL_NUMBER, identification
 
 NODE_TYPE = 6
 

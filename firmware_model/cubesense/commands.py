@@ -18,12 +18,12 @@ from cubestack.firmware_model.cubesense.state import CameraSettings, State, dist
 from cubestack.firmware_model.cubesense.supply import Supply
 from cubestack.firmware_model.cubesense.vision.distortion import DistortionError
 from cubestack.firmware_model.cubesense.vision.masks import Mask
-from cubestack.firmware_model.interface.codec.node_codes import AckError
+from cubestack.firmware_model.interface.codec.node_messages import AckError
 from cubestack.firmware_model.interface.cubesense import codes
 from cubestack.firmware_model.interface.cubesense.switches import CubeSenseSwitches
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import Pay, Routine
-from cubestack.firmware_model.node.switches import SWITCH_COMMANDS
+from cubestack.firmware_model.node.state import SWITCH_COMMANDS
 
 SOFTWARE_RESET = 1  #: cause of the program's own reset
 

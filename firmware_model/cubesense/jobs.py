@@ -13,7 +13,7 @@ from typing import Any
 from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.interface.cubesense.codes import Camera, ImageSize, Sram
 from cubestack.firmware_model.mcu.requests import Routine
-from cubestack.firmware_model.node.queue import BoundedQueue
+from cubestack.firmware_model.node.commands import BoundedQueue
 
 
 @dataclass(frozen=True, eq=False)

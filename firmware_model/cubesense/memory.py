@@ -7,8 +7,8 @@ Program code is not modelled, so flash must leave room for it. The program never
 Earth and the Sun at the same time, so their buffers share memory.
 """
 
+from cubestack.firmware_model.cubesense.download import CHUNK_BYTES
 from cubestack.firmware_model.cubesense.links.bench import LETTERS
-from cubestack.firmware_model.cubesense.links.image_sender import CHUNK_BYTES
 from cubestack.firmware_model.cubesense.links.registers import READ_AHEAD_BYTES
 from cubestack.firmware_model.cubesense.vision.distortion import TABLE_ENTRIES, Projection
 from cubestack.firmware_model.cubesense.vision.edges import MAX_EDGES
@@ -21,8 +21,8 @@ from cubestack.firmware_model.interface.cubesense.switches import (
     CubeSenseSwitches,
 )
 from cubestack.firmware_model.interface.cubesense.telecommands import DISTORTION_TERMS, TELECOMMANDS
-from cubestack.firmware_model.mcu.memory_budget import Buffer, Memory, used
-from cubestack.firmware_model.node.queue import QUEUE_DEPTH
+from cubestack.firmware_model.mcu.memory import Buffer, Memory, used
+from cubestack.firmware_model.node.commands import QUEUE_DEPTH
 
 __all__ = ["CAPACITY", "Buffer", "Memory", "budget", "report", "used"]
 

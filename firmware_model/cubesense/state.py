@@ -12,14 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.cubesense.vision.masks import Mask
-from cubestack.firmware_model.interface.codec.node_codes import AckError
+from cubestack.firmware_model.interface.codec.node_messages import AckError
 from cubestack.firmware_model.interface.cubesense import INTERFACE, codes, telecommands
 from cubestack.firmware_model.interface.cubesense.switches import (
     DEFAULT_SWITCHES,
     CubeSenseSwitches,
 )
-from cubestack.firmware_model.node.state import NodeState
-from cubestack.firmware_model.node.switches import RunningSwitches
+from cubestack.firmware_model.node.state import NodeState, RunningSwitches
 
 ERROR_FLAGS = ("TcmdBufferOverrun", "I2cTlmReadError", "UartProtocolError", "UartMsgIncomplete")
 """Flags of telemetry CommunicationStatus."""

@@ -16,7 +16,7 @@ from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.interface.codec.switch_messages import SHOWN, shown_values
 from cubestack.firmware_model.interface.cubesense import INTERFACE, codes, pins, telemetry
 from cubestack.firmware_model.mcu.costs import Meter
-from cubestack.firmware_model.node.identification import identification
+from cubestack.firmware_model.node.state import identification
 
 NODE_TYPE = 4  #: assumed
 

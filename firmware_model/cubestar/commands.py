@@ -9,14 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from cubestack.firmware_model.cubestar.link import TASKS
 from cubestack.firmware_model.cubestar.processing.chain import Processing
-from cubestack.firmware_model.cubestar.tasks import TASKS
 from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
 from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES, UPLOAD_BLOCK_BYTES, codes
 from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Routine, pause
-from cubestack.firmware_model.node.commands import CommandExecutor
-from cubestack.firmware_model.node.queue import QueuedCommand
+from cubestack.firmware_model.node.commands import CommandExecutor, QueuedCommand
 
 WATCHDOG_US = 2_000_000  #: period of the watchdog; assumed
 STREAM_BACKLOG_BYTES = 512

@@ -7,7 +7,7 @@ from cubestack.firmware_model.attitude.geometry import CameraParameters
 from cubestack.firmware_model.cubestar.detection import DetectionConfig
 from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
 from cubestack.firmware_model.interface.cubestar.telecommands import MOST_STARS
-from cubestack.firmware_model.node.settings import Settings
+from cubestack.firmware_model.node.state import Settings
 
 
 def detection_config(

@@ -1,12 +1,32 @@
 """Peripherals of CubeStar's EFM32GG that the program uses without a request."""
 
+from collections.abc import Collection
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.mcu.flash_store import FlashStore
+from cubestack.firmware_model.interface.cubestar.codes import ResetCause
+from cubestack.firmware_model.mcu.memory import FlashStore
 from cubestack.firmware_model.node.hardware import NodeHardware
+
+_SUPPLY = (ResetCause.POWER_ON, ResetCause.BROWN_OUT_UNREGULATED, ResetCause.BROWN_OUT_REGULATED)
+_MEANINGS: dict[frozenset[int], ResetCause] = {
+    **{frozenset({one}): one for one in ResetCause},
+    frozenset({ResetCause.EXTERNAL_PIN, ResetCause.WATCHDOG}): ResetCause.EXTERNAL_OR_WATCHDOG,
+    frozenset({ResetCause.LOCKUP, ResetCause.SYSTEM_REQUEST}): ResetCause.LOCKUP_OR_SYSTEM_REQUEST,
+}
+
+
+def cause_of(bits: Collection[int]) -> ResetCause:
+    """The published number of the reset-cause register's set bits, each given by its own number.
+
+    The bits stay until the program clears them. The published list has numbers for two pairs of
+    causes. The rest is assumed: a cause that includes a rise of the supply hides all others, and
+    any other combination is undetermined.
+    """
+    hiding = [cause for cause in _SUPPLY if cause in bits]
+    return hiding[0] if hiding else _MEANINGS.get(frozenset(bits), ResetCause.UNDETERMINED)
 
 
 class CubeStarHardware(NodeHardware, Protocol):

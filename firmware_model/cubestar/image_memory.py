@@ -19,7 +19,7 @@ from cubestack.firmware_model.cubestar.state import State
 from cubestack.firmware_model.cubestar.supply import SupplyMonitor
 from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
 from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES, pins
-from cubestack.firmware_model.interface.cubestar.layouts import Layout
+from cubestack.firmware_model.interface.cubestar.pins import Layout
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import BusAccess, Pay, Routine, SetPin, StrobeRead
 

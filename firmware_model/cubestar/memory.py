@@ -25,9 +25,9 @@ from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES, INTERFACE
 from cubestack.firmware_model.interface.cubestar.telecommands import MOST_STARS
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
 from cubestack.firmware_model.mcu.costs import Meter
-from cubestack.firmware_model.mcu.memory_budget import Buffer, Memory
+from cubestack.firmware_model.mcu.memory import Buffer, Memory
+from cubestack.firmware_model.node.commands import QUEUE_DEPTH
 from cubestack.firmware_model.node.link import longest_command
-from cubestack.firmware_model.node.queue import QUEUE_DEPTH
 from cubestack.firmware_model.star_tracker.background import CELL
 
 KB = 1024

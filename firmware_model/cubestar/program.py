@@ -11,17 +11,16 @@ from cubestack.firmware_model.cubestar import phases
 from cubestack.firmware_model.cubestar.capture import ImageCapture
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.cubestar.commands import Commands
-from cubestack.firmware_model.cubestar.hardware import CubeStarHardware
+from cubestack.firmware_model.cubestar.hardware import CubeStarHardware, cause_of
 from cubestack.firmware_model.cubestar.image_memory import image_memory
 from cubestack.firmware_model.cubestar.image_sensor import ImageSensor
 from cubestack.firmware_model.cubestar.link import CubeStarLink
 from cubestack.firmware_model.cubestar.processing.chain import Processing
-from cubestack.firmware_model.cubestar.reset_cause import cause_of
 from cubestack.firmware_model.cubestar.state import State
 from cubestack.firmware_model.cubestar.supply import SupplyMonitor
 from cubestack.firmware_model.cubestar.telemetry import Telemetry
 from cubestack.firmware_model.interface.cubestar.codes import ResetCause
-from cubestack.firmware_model.interface.cubestar.layouts import Layout
+from cubestack.firmware_model.interface.cubestar.pins import Layout
 from cubestack.firmware_model.interface.cubestar.switches import DEFAULT_SWITCHES, CubeStarSwitches
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Reset, Routine

@@ -25,9 +25,7 @@ from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.firmware_model.interface.cubestar.codes import MatchMode, ResetCause, TaskStatus
 from cubestack.firmware_model.interface.cubestar.switches import DEFAULT_SWITCHES, CubeStarSwitches
 from cubestack.firmware_model.mcu.costs import Meter
-from cubestack.firmware_model.node.settings import Settings
-from cubestack.firmware_model.node.state import NodeState
-from cubestack.firmware_model.node.switches import RunningSwitches
+from cubestack.firmware_model.node.state import NodeState, RunningSwitches, Settings
 
 #: Telecommands whose parameters are stored.
 SETTING_COMMANDS = (

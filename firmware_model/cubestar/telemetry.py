@@ -14,7 +14,7 @@ from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.interface.codec.switch_messages import SHOWN, shown_values
 from cubestack.firmware_model.interface.cubestar import INTERFACE, ImageBlockSize, SwitchState
 from cubestack.firmware_model.interface.cubestar.flags import flag_fields
-from cubestack.firmware_model.node.identification import SERIAL_NUMBER, identification
+from cubestack.firmware_model.node.state import SERIAL_NUMBER, identification
 
 NODE_TYPE = 5
 

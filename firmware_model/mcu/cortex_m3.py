@@ -1,14 +1,53 @@
 """Cycle costs of the EFM32GG: Cortex-M3, no floating point unit, 48 MHz.
 
 CubeStar thesis, section 3.2 (the part). Operations cost their cycles as compiled code on the
-simulated part, see ``compiled``; the thesis' compiler and its options are not published. The
+simulated part; the thesis' compiler and its options are not published. The
 transfer loop is the only entry fitted to a published duration (table 6.2). Of that table only
 capture and processing is a prediction: the discard delay is a setting, and idle is the rest of the
 second.
+
+The file of measurements, build by build, is written by `cubestack costs measure --write`: each
+operation as compiled code (``firmware_model/reference/costs``), and the phases of a whole image.
 """
 
-from cubestack.firmware_model.mcu.compiled import costs_of, load_measurements
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
 from cubestack.firmware_model.mcu.costs import Cost, CostTable
+
+FILE = Path(__file__).with_name("cortex_m3_compiled.json")
+
+
+@dataclass(frozen=True)
+class CompiledCosts:
+    """One build on one memory."""
+
+    build: str  #: options and precision, such as "-O2 own"
+    timing: str  #: wait states of the memories, as text
+    #: cycles by name; below 1 where a compiler hides an operation behind others
+    operations: Mapping[str, float]
+    phases: Mapping[str, int]  #: cycles of a whole image's phases
+
+
+@lru_cache(maxsize=1)
+def load_measurements() -> tuple[str, tuple[CompiledCosts, ...]]:
+    """The compiler, and the measurements of its builds."""
+    data = json.loads(FILE.read_text("utf-8"))
+    return data["compiler"], tuple(CompiledCosts(**one) for one in data["builds"])
+
+
+def costs_of(build: str, timing: str) -> CompiledCosts:
+    """Measurements of a build; raises ValueError if there are none."""
+    _, found = load_measurements()
+    for costs in found:
+        if (costs.build, costs.timing) == (build, timing):
+            return costs
+    known = "; ".join(f"{costs.build}, {costs.timing}" for costs in found)
+    raise ValueError(f"{build}, {timing} was not measured, but {known}")
+
 
 #: Optimised, single precision throughout; `cubestack costs measure` has the others.
 BUILD = "-O2 own"

@@ -1,15 +1,44 @@
-"""Executes telecommands one after the other, in the main loop."""
+"""The queue of a node's jobs, and the telecommands that its main loop takes from there."""
 
+from collections import deque
 from collections.abc import Callable
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, TypeVar
 
+from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.mcu.requests import Pay, Routine, pause
 from cubestack.firmware_model.node.hardware import NodeHardware
-from cubestack.firmware_model.node.queue import QueuedCommand
-from cubestack.firmware_model.node.settings import Settings
-from cubestack.firmware_model.node.switches import SWITCH_COMMANDS, RunningSwitches
+from cubestack.firmware_model.node.state import SWITCH_COMMANDS, RunningSwitches, Settings
+
+QUEUE_DEPTH = 4  #: most jobs that wait, as the hosts of these nodes expect
 
 STREAM_PAUSE_US = 20_000
+
+Job = TypeVar("Job")
+
+
+@dataclass(frozen=True)
+class QueuedCommand:
+    """An accepted telecommand with its decoded parameters and its time of arrival."""
+
+    message: Message
+    values: dict[str, Any]
+    received_us: int = 0
+
+
+class BoundedQueue(deque[Job]):
+    """Jobs in their order, at most ``QUEUE_DEPTH``."""
+
+    @property
+    def full(self) -> bool:
+        return len(self) >= QUEUE_DEPTH
+
+    def put(self, job: Job) -> bool:
+        """Append ``job``; False if the queue is full."""
+        accepted = not self.full
+        if accepted:
+            self.append(job)
+        return accepted
 
 
 class CommandExecutor:

@@ -21,10 +21,10 @@ from cubestack.firmware_model.interface.codec.message import (
     Message,
     MessageKind,
 )
-from cubestack.firmware_model.interface.codec.node_codes import AckError
+from cubestack.firmware_model.interface.codec.node_messages import AckError
 from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.node.commands import BoundedQueue, QueuedCommand
 from cubestack.firmware_model.node.hardware import NodeHardware
-from cubestack.firmware_model.node.queue import BoundedQueue, QueuedCommand
 from cubestack.firmware_model.node.state import NodeState
 
 NO_DATA = 0xFF  #: byte read beyond the end of a message, or without one

@@ -13,10 +13,8 @@ from cubestack.firmware_model.interface.codec.message import Interface, Message
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import Pay, Reset, Routine, Sleep
 from cubestack.firmware_model.node.hardware import NodeHardware
-from cubestack.firmware_model.node.identification import identification
 from cubestack.firmware_model.node.link import BusFlags, LinkFlags, QueueingLink
-from cubestack.firmware_model.node.settings import Settings
-from cubestack.firmware_model.node.state import NodeState
+from cubestack.firmware_model.node.state import NodeState, Settings, identification
 
 POWER_ON, TELECOMMAND = 1, 2  #: causes of a reset
 

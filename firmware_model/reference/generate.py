@@ -7,7 +7,7 @@ catalogue come from the host's tools; see the Makefile.
 import sys
 from pathlib import Path
 
-from cubestack.firmware_model.interface.cubestar.processor_header import pins_header
+from cubestack.firmware_model.interface.cubestar.processor_pins import pins_header
 from cubestack.firmware_model.interface.efm32gg import LAYOUTS
 from cubestack.firmware_model.interface.efm32gg.c_header import c_header
 from cubestack.firmware_model.reference import tables

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from itertools import groupby
 
 from cubestack.firmware_model.cubestar import state, telemetry
-from cubestack.firmware_model.cubestar.tasks import TASKS
+from cubestack.firmware_model.cubestar.link import TASKS
 from cubestack.firmware_model.interface.cameras import mlx75412
 from cubestack.firmware_model.interface.codec import switch_messages
 from cubestack.firmware_model.interface.codec.field import Field
@@ -18,7 +18,8 @@ from cubestack.firmware_model.interface.codec.message import Message, MessageKin
 from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.firmware_model.interface.cubestar.codes import TaskStatus
 from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitches
-from cubestack.firmware_model.node import identification, link, queue
+from cubestack.firmware_model.node import commands, link
+from cubestack.firmware_model.node import state as node_state
 
 #: Steps of the processing with a separate time, as ``Processing`` names them.
 STEPS = tuple(
@@ -50,11 +51,11 @@ def _opening(guard: str) -> Iterator[str]:
 def _declarations() -> Iterator[str]:
     yield f"#define LONGEST_TELECOMMAND {link.longest_command(INTERFACE)} /* with its ID */"
     yield f"#define LONGEST_TELEMETRY {max(m.length for m in INTERFACE.telemetries)}"
-    yield f"#define QUEUE_DEPTH {queue.QUEUE_DEPTH}"
+    yield f"#define QUEUE_DEPTH {commands.QUEUE_DEPTH}"
     yield f"#define NODE_TYPE {telemetry.NODE_TYPE}"
-    yield f"#define SERIAL_NUMBER {identification.SERIAL_NUMBER}"
+    yield f"#define SERIAL_NUMBER {node_state.SERIAL_NUMBER}"
     yield "#define FIRMWARE_VERSION_MAJOR {}\n#define FIRMWARE_VERSION_MINOR {}".format(
-        *identification.FIRMWARE_VERSION
+        *node_state.FIRMWARE_VERSION
     )
     yield f"#define TELECOMMANDS {len(INTERFACE.telecommands)}"
     yield f"#define TELEMETRIES {len(_telemetries())}"

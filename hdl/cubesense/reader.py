@@ -9,7 +9,7 @@ from amaranth.hdl import Cat, ClockDomain, ClockSignal, Module, Mux, ResetSignal
 from amaranth.lib.wiring import Component, In, Out
 
 from cubestack.firmware_model.interface.cubesense.fpga import ReadOut
-from cubestack.hdl.blocks.matrix_counter import MatrixCounter
+from cubestack.hdl.blocks.counters import MatrixCounter
 from cubestack.hdl.cubesense.nadir_scan import NadirScan
 from cubestack.hdl.cubesense.sun_window import SunWindow
 

@@ -19,16 +19,17 @@ The coordinates of the first Sun pixel are not reset: a pixel clock writes them 
 stored, and they are stable whenever a data clock reads them.
 """
 
-from amaranth.hdl import Cat, Module, ResetSignal
+from amaranth.hdl import Cat, ClockDomain, ClockSignal, Module, ResetSignal, Value
+from amaranth.lib.cdc import ResetSynchronizer
 
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, ReadOut
 from cubestack.firmware_model.interface.cubesense.pins import ADDRESSING, FPGA
 from cubestack.firmware_model.interface.pins import resized
+from cubestack.hdl.blocks.frames import FrameGap, FrameWriter
 from cubestack.hdl.blocks.pinned import PinnedComponent
 from cubestack.hdl.cubesense.dataflow import DataflowControl, Side, check_side
 from cubestack.hdl.cubesense.reader import CubeSenseReader
 from cubestack.hdl.cubesense.sun_search import SunSearch
-from cubestack.hdl.cubesense.writer import add_writer
 
 
 class CubeSenseFpga(PinnedComponent):
@@ -133,3 +134,26 @@ class CubeSenseFpga(PinnedComponent):
             ),
         ]
         return m
+
+
+def add_writer(
+    m: Module, domain: str, wanted: Value, clock: Value, href: Value, pixel: Value, size: ReadOut
+) -> FrameWriter:
+    """Add a writer in the new clock domain ``domain`` of ``clock``, in reset unless ``wanted``.
+
+    Section 6.4.2: one for the own camera's image, one for the image over the link.
+
+    The reset is asserted asynchronously and released through two flip-flops.
+    """
+    m.domains += ClockDomain(domain, async_reset=True, local=True)
+    m.d.comb += ClockSignal(domain).eq(clock)
+    m.submodules[f"{domain}_reset"] = ResetSynchronizer(~wanted, domain=domain)
+    m.submodules[f"{domain}_gap"] = gap = FrameGap(size.frame_gap, domain=domain)
+    m.submodules[f"{domain}_writer"] = writer = FrameWriter(size.columns, size.rows, domain=domain)
+    m.d.comb += [
+        gap.href.eq(href),
+        writer.hsync.eq(href),
+        writer.vsync.eq(gap.vsync),
+        writer.pixel.eq(pixel),
+    ]
+    return writer

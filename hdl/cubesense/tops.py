@@ -5,10 +5,8 @@ from pathlib import Path
 
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, READ_OUTS, ReadOut
 from cubestack.firmware_model.interface.cubesense.pins import CLK, PCLK
-from cubestack.hdl.blocks.frame_gap import FrameGap
-from cubestack.hdl.blocks.frame_writer import FrameWriter
-from cubestack.hdl.blocks.gray_counter import GrayCounter
-from cubestack.hdl.blocks.matrix_counter import MatrixCounter
+from cubestack.hdl.blocks.counters import GrayCounter, MatrixCounter
+from cubestack.hdl.blocks.frames import FrameGap, FrameWriter
 from cubestack.hdl.cubesense.dataflow import SIDES, Side
 from cubestack.hdl.cubesense.nadir_scan import NadirScan
 from cubestack.hdl.cubesense.pair import CubeSensePair

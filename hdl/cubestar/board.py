@@ -11,10 +11,9 @@ from amaranth.lib.cdc import ResetSynchronizer
 from cubestack.firmware_model.interface.cubestar import pins
 from cubestack.firmware_model.interface.pins import Pin, resized
 from cubestack.hdl.blocks.bus_port import BusPort
-from cubestack.hdl.blocks.frame_writer import FrameWriter
-from cubestack.hdl.blocks.matrix_counter import MatrixCounter
-from cubestack.hdl.blocks.pinned import PinnedComponent
-from cubestack.hdl.blocks.stride import Stride
+from cubestack.hdl.blocks.counters import MatrixCounter
+from cubestack.hdl.blocks.frames import FrameWriter
+from cubestack.hdl.blocks.pinned import PinnedComponent, Stride
 
 
 class CubeStarBoard(PinnedComponent):

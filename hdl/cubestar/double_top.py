@@ -14,7 +14,7 @@ How each asynchronous input is brought in:
 from amaranth.hdl import ClockDomain, ClockSignal, Module, Signal
 
 from cubestack.firmware_model.interface.cubestar.pins import DOUBLE
-from cubestack.hdl.blocks.stride import Stride
+from cubestack.hdl.blocks.pinned import Stride
 from cubestack.hdl.cubestar.board import CubeStarBoard
 
 _SRAM = ("A", "D_I", "D_O", "D_OE", "CE_N", "OE_N", "WE_N")

@@ -19,8 +19,8 @@ from amaranth.hdl import Cat, ClockDomain, ClockSignal, Module, Mux, ResetSignal
 
 from cubestack.firmware_model.interface.cubestar import pins
 from cubestack.firmware_model.interface.cubestar.pins import PUBLISHED
-from cubestack.hdl.blocks.frame_reader import FrameReader
-from cubestack.hdl.blocks.stride import Stride
+from cubestack.hdl.blocks.frames import FrameReader
+from cubestack.hdl.blocks.pinned import Stride
 from cubestack.hdl.cubestar.board import CubeStarBoard
 
 

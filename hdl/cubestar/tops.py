@@ -4,13 +4,11 @@ from functools import partial
 from pathlib import Path
 
 from cubestack.firmware_model.interface.cubestar.pins import ALE, DCLK, ENABLE, PIXCLK, RNW
-from cubestack.hdl.blocks.frame_reader import FrameReader
-from cubestack.hdl.blocks.frame_writer import FrameWriter
-from cubestack.hdl.blocks.matrix_counter import MatrixCounter
+from cubestack.hdl.blocks.counters import MatrixCounter
+from cubestack.hdl.blocks.frames import FrameReader, FrameWriter
 from cubestack.hdl.cubestar.double_top import CubeStarDouble
-from cubestack.hdl.cubestar.shared_top import CubeStarShared
+from cubestack.hdl.cubestar.shared_top import CubeStarShared, CubeStarTwoBoards
 from cubestack.hdl.cubestar.top import CubeStarTop
-from cubestack.hdl.cubestar.two_boards import CubeStarTwoBoards
 from cubestack.hdl.flow.top import Block, Clock, Top, TopTable
 
 _PIXCLK = Clock(PIXCLK, 100, "image sensor at 10 MHz")

@@ -1,4 +1,4 @@
-"""Runs one proof: the design as shipped, a harness around it, temporal induction.
+"""Runs proofs: the design as shipped, a harness around it, temporal induction.
 
 The design is flattened; its ports, and the internal wires that the harness names, become signals of
 the harness. Yosys converts all clocks and asynchronous resets into steps of one time (its
@@ -9,9 +9,10 @@ Registers start with any value, as in the part. For a design with a planted faul
 find a counterexample from the start, which needs a small image.
 """
 
+import json
 import re
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from types import SimpleNamespace
@@ -217,3 +218,52 @@ class _Harness(Component):
         m.submodules.design = Instance("design", **ports)
         self._assertions(m, signals, inside)
         return m
+
+
+class ProofVerdict(NamedTuple):
+    """Outcome of a proof, and of the same with a fault planted."""
+
+    name: str
+    proof: Proof
+    result: ProofResult
+    planted: ProofResult
+
+    @property
+    def good(self) -> bool:
+        """True if the property is proved and the planted fault refutes it."""
+        return self.result.proved and self.planted.counterexample
+
+
+def verdicts(proofs: Mapping[str, Proof]) -> Iterator[ProofVerdict]:
+    for name, proof in proofs.items():
+        yield ProofVerdict(name, proof, prove(proof), prove(proof, planted=True))
+
+
+def verdict_text(verdict: ProofVerdict) -> str:
+    name, proof, result, planted = verdict
+    seconds = f"{result.seconds + planted.seconds:.1f} s"
+    outcome = f"proved, induction over {result.steps}" if result.proved else "NOT PROVED"
+    if result.counterexample:
+        outcome = f"REFUTED after {result.steps} steps"
+    found = f"found after {planted.steps} steps" if planted.counterexample else "NOT FOUND"
+    fault = proof.fault
+    return (
+        f"{name}: {proof.property}\n"
+        f"  {outcome}; planted bug ({fault.wire} stuck at {fault.level}) {found}; {seconds}"
+    )
+
+
+def verdict_json(done: Iterable[ProofVerdict]) -> str:
+    return json.dumps(
+        {
+            verdict.name: {
+                "property": verdict.proof.property,
+                "good": verdict.good,
+                "proof": verdict.result._asdict(),
+                "fault": verdict.proof.fault._asdict(),
+                "planted": verdict.planted._asdict(),
+            }
+            for verdict in done
+        },
+        indent=1,
+    )

@@ -6,8 +6,7 @@ from types import SimpleNamespace
 from amaranth.hdl import Assert, Cat, Module, Mux, Value
 from amaranth.lib.wiring import In
 
-from cubestack.hdl.blocks.pinned import PinnedComponent
-from cubestack.hdl.blocks.stride import Stride
+from cubestack.hdl.blocks.pinned import PinnedComponent, Stride
 from cubestack.hdl.proofs.properties import first_step
 from cubestack.hdl.proofs.prover import Proof, StuckWire, past
 

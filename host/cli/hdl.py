@@ -19,8 +19,7 @@ from cubestack.firmware_model.values import whole
 from cubestack.hdl.flow.area_report import area_json, area_table, areas
 from cubestack.hdl.flow.top import TopTable, designs_with_area, tops_in
 from cubestack.hdl.flow.verilog import verilog_file
-from cubestack.hdl.proofs.prover import Proof
-from cubestack.hdl.proofs.verdicts import verdict_json, verdict_text, verdicts
+from cubestack.hdl.proofs.prover import Proof, verdict_json, verdict_text, verdicts
 from cubestack.host.cli.arguments import Parser, add_value
 from cubestack.host.cli.waveform import find, show
 from cubestack.host.devices.registry import merged_tables

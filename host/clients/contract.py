@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Protocol, Self, TypeVar
 
 from cubestack.firmware_model.interface.codec.field import Value
 from cubestack.firmware_model.interface.codec.message import Interface, Message
-from cubestack.firmware_model.interface.codec.node_codes import AckError
+from cubestack.firmware_model.interface.codec.node_messages import AckError
 from cubestack.firmware_model.interface.codec.switch_messages import (
     SET_PROFILE,
     SET_SWITCH,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from cubestack.firmware_model.interface.cameras.mlx75412 import REGISTERS
 from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES, INTERFACE
-from cubestack.firmware_model.interface.cubestar.layouts import Layout
+from cubestack.firmware_model.interface.cubestar.pins import Layout
 from cubestack.firmware_model.interface.cubestar.switches import DEFAULT_SWITCHES, CubeStarSwitches
 from cubestack.host.conformance import effects
 from cubestack.host.devices.device import FILE, BoardOption, ConformanceNotes, Device, Report
@@ -188,7 +188,7 @@ DEVICE: "Device[CubeStarStack, CubeStar]" = Device(
             "handle semihosting calls (BKPT 0xAB) of --firmware; without it they are faults",
         ),
     ),
-    processor=get("cubestack.firmware_model.interface.cubestar.processor_header:PROCESSOR"),
+    processor=get("cubestack.firmware_model.interface.cubestar.processor_pins:PROCESSOR"),
     tops=get("cubestack.hdl.cubestar.tops:TOPS"),
     proofs=get("cubestack.hdl.proofs.cubestar:PROOFS"),
     image_sensor=REGISTERS,

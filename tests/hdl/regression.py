@@ -28,9 +28,8 @@ from cocotb_tools.runner import Runner, get_runner
 from cubestack.firmware_model.interface.cubesense.fpga import ReadOut
 from cubestack.hdl.cubesense.pair import CubeSensePair
 from cubestack.hdl.cubestar.double_top import CubeStarDouble
-from cubestack.hdl.cubestar.shared_top import CubeStarShared
+from cubestack.hdl.cubestar.shared_top import CubeStarShared, CubeStarTwoBoards
 from cubestack.hdl.cubestar.top import CubeStarTop
-from cubestack.hdl.cubestar.two_boards import CubeStarTwoBoards
 
 HERE = Path(__file__).parent
 

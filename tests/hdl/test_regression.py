@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from cubestack.hdl.blocks.matrix_counter import MatrixCounter
+from cubestack.hdl.blocks.counters import MatrixCounter
 from cubestack.hdl.flow.generate import verilog_text
 from tests.hdl.regression import STAR, TIERS, build, frame_environment, modules, run_tier, simulate
 

@@ -19,7 +19,7 @@ from cubestack.firmware_model.interface.cubestar.codes import (
     TaskStatus,
     TestPattern,
 )
-from cubestack.firmware_model.interface.cubestar.layouts import Layout
+from cubestack.firmware_model.interface.cubestar.pins import Layout
 from cubestack.host.cli.main import main
 from cubestack.host.devices.registry import device
 from cubestack.host.emulation.emulated import AnyEmulated, open_device

@@ -7,7 +7,7 @@ from smbus2 import i2c_msg
 from cubestack.emulator.boards.aramis import board as aramis_board
 from cubestack.emulator.boards.cubestar import board as cubestar_board
 from cubestack.firmware_model.interface.cubesense.codes import Camera
-from cubestack.firmware_model.mcu.flash_store import FlashStore
+from cubestack.firmware_model.mcu.memory import FlashStore
 from tests.system.conftest import ROOT
 from tests.system.cubesense.conftest import held
 from tests.system.faults.bench import BENCHES, powered

@@ -27,8 +27,7 @@ from cubestack.emulator.scene.sky import Scene
 from cubestack.emulator.sim.processor import Processor
 from cubestack.firmware_model.aramis.catalogue.database import Database
 from cubestack.firmware_model.aramis.catalogue.flash_store import flash_image
-from cubestack.firmware_model.aramis.hardware import FrameEnd
-from cubestack.firmware_model.aramis.memory import FLASH_BYTES, PICTURES_AT, SDRAM_BYTES
+from cubestack.firmware_model.aramis.hardware import FLASH_BYTES, PICTURES_AT, SDRAM_BYTES, FrameEnd
 from cubestack.firmware_model.aramis.program import AramisProgram
 from cubestack.firmware_model.interface.aramis import IMAGE_BYTES, INTERFACE, ResetCause
 from cubestack.firmware_model.interface.aramis.codes import MeasurementOutcome, SensorState
@@ -36,7 +35,7 @@ from cubestack.firmware_model.interface.aramis.switches import DEFAULT_SWITCHES,
 from cubestack.firmware_model.interface.cameras.mt9m001 import COLUMNS, REGISTERS, ROWS
 from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
 from cubestack.firmware_model.mcu.costs import Meter
-from cubestack.firmware_model.mcu.flash_store import FlashStore
+from cubestack.firmware_model.mcu.memory import FlashStore
 
 BOOT_US = 50_000
 """Reset to main: the boot code copies the program from flash to memory (assumed)."""

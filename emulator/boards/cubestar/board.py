@@ -23,11 +23,11 @@ from cubestack.firmware_model.cubestar.program import CubeStarProgram
 from cubestack.firmware_model.interface.cameras.mlx75412 import REGISTERS
 from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.firmware_model.interface.cubestar.codes import ResetCause, TaskStatus
-from cubestack.firmware_model.interface.cubestar.layouts import Layout
+from cubestack.firmware_model.interface.cubestar.pins import Layout
 from cubestack.firmware_model.interface.cubestar.switches import DEFAULT_SWITCHES, CubeStarSwitches
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
 from cubestack.firmware_model.mcu.costs import Meter
-from cubestack.firmware_model.mcu.flash_store import FlashStore
+from cubestack.firmware_model.mcu.memory import FlashStore
 
 BOOT_US = 3_000
 """Reset to main: "a few milliseconds" (section 5.3.6)."""

@@ -27,7 +27,7 @@ from cubestack.emulator.sim.fpga_port import FpgaPort
 from cubestack.firmware_model.interface.cubestar import INTERFACE, pins
 from cubestack.firmware_model.interface.cubestar import processor_pins as wired
 from cubestack.firmware_model.interface.cubestar.codes import ResetCause
-from cubestack.firmware_model.interface.cubestar.layouts import Layout
+from cubestack.firmware_model.interface.cubestar.pins import Layout
 from cubestack.firmware_model.interface.efm32gg.pins import pin_number
 
 HANG_US = 1

@@ -16,8 +16,7 @@ from cubestack.emulator.boards.cubestar import wiring
 from cubestack.emulator.boards.cubestar.power import CUBESTAR_POWER
 from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.emulator.sim.power import Part, PowerTable
-from cubestack.firmware_model.interface.cubestar.layouts import Layout
-from cubestack.firmware_model.interface.cubestar.pins import BOARD_PREFIXES, ENABLE, RNW
+from cubestack.firmware_model.interface.cubestar.pins import BOARD_PREFIXES, ENABLE, RNW, Layout
 
 Pins = Mapping[str, int]
 States = dict[str, str]

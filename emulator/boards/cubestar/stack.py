@@ -26,7 +26,7 @@ from cubestack.emulator.scene.sky import Scene
 from cubestack.firmware_model.cubestar.memory import EXTERNAL_RAM_BYTES
 from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
 from cubestack.firmware_model.interface.cubestar.codes import ResetCause
-from cubestack.firmware_model.interface.cubestar.layouts import Layout
+from cubestack.firmware_model.interface.cubestar.pins import Layout
 
 FORCED_RESETS = {
     "brown-out": ResetCause.BROWN_OUT_UNREGULATED,

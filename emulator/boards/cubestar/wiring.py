@@ -7,9 +7,8 @@ from amaranth.lib.wiring import Component
 from cubestack.emulator.rtl.wiring import BusPins, CameraPins, Level, Levels, MemoryPins, Wiring
 from cubestack.firmware_model.interface.cubestar import pins
 from cubestack.hdl.cubestar.double_top import CubeStarDouble
-from cubestack.hdl.cubestar.shared_top import CubeStarShared
+from cubestack.hdl.cubestar.shared_top import CubeStarShared, CubeStarTwoBoards
 from cubestack.hdl.cubestar.top import CubeStarTop
-from cubestack.hdl.cubestar.two_boards import CubeStarTwoBoards
 
 _IMAGER = CameraPins("imager", pins.PIXCLK, pins.PIXDATA, pins.HSYNC, pins.VSYNC)
 

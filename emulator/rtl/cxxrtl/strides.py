@@ -1,6 +1,6 @@
 """Generates C++ of a design's strides for driver.cpp: whether one can begin, and its end state.
 
-A stride is declared with its design, and proved (:mod:`cubestack.hdl.blocks.stride`); driver.cpp
+A stride is declared with its design, and proved (:mod:`cubestack.hdl.blocks.pinned`); driver.cpp
 performs its memory accesses.
 """
 
@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 from cubestack.emulator.rtl.cxxrtl.clock_steps import port
 from cubestack.emulator.rtl.wiring import Levels, Wiring
-from cubestack.hdl.blocks.stride import Stride
+from cubestack.hdl.blocks.pinned import Stride
 
 _ESCAPE = re.compile("__|_([0-9a-f]{2})_")
 

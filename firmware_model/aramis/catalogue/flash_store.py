@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from cubestack.firmware_model.aramis.catalogue import hamming
 from cubestack.firmware_model.aramis.catalogue.database import Database, DatabaseError
 from cubestack.firmware_model.aramis.catalogue.hamming import CODED_BYTES, DATA_BYTES
-from cubestack.firmware_model.aramis.hardware import AramisHardware
-from cubestack.firmware_model.aramis.memory import CATALOGUE_AT, SECTOR_BYTES
+from cubestack.firmware_model.aramis.hardware import CATALOGUE_AT, SECTOR_BYTES, AramisHardware
 from cubestack.firmware_model.interface.aramis import MOST_CATALOGUE_BYTES, CatalogueState
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Routine, pause

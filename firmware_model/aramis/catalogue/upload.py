@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from cubestack.firmware_model.aramis.arrays import Mask
 from cubestack.firmware_model.aramis.catalogue.database import Database, DatabaseError
 from cubestack.firmware_model.aramis.catalogue.flash_store import CatalogueStore
-from cubestack.firmware_model.aramis.hardware import AramisHardware
-from cubestack.firmware_model.aramis.memory import UPLOAD_AT
+from cubestack.firmware_model.aramis.hardware import UPLOAD_AT, AramisHardware
 from cubestack.firmware_model.interface.aramis import BLOCK_BYTES
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import Pay, Routine

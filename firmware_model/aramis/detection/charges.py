@@ -7,10 +7,9 @@ from math import ceil, log2
 
 import numpy as np
 
+from cubestack.firmware_model.aramis.detection.mask import WINDOW, SpikeRemoval
 from cubestack.firmware_model.aramis.detection.regions import Regions
-from cubestack.firmware_model.aramis.detection.smear import LARGEST
-from cubestack.firmware_model.aramis.detection.spikes import WINDOW, SpikeRemoval
-from cubestack.firmware_model.aramis.detection.spots import RING, StarSpots
+from cubestack.firmware_model.aramis.detection.spots import LARGEST, RING, StarSpots
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.star_tracker.background import BLOCK, CELL, SkyBackground
 

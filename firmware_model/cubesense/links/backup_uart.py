@@ -10,9 +10,9 @@ it.
 
 from dataclasses import dataclass
 
+from cubestack.firmware_model.cubesense.download import ImageSender
 from cubestack.firmware_model.cubesense.hardware import Port
 from cubestack.firmware_model.cubesense.jobs import Background
-from cubestack.firmware_model.cubesense.links.image_sender import ImageSender
 from cubestack.firmware_model.cubesense.links.registers import RegisterLink
 from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
 from cubestack.firmware_model.mcu.requests import Routine

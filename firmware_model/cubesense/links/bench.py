@@ -10,10 +10,9 @@ image again for every piece.
 from collections import deque
 from dataclasses import dataclass
 
-from cubestack.firmware_model.cubesense.download import ImageReader
+from cubestack.firmware_model.cubesense.download import ImageReader, ImageSender
 from cubestack.firmware_model.cubesense.hardware import CubeSenseHardware, Port
 from cubestack.firmware_model.cubesense.jobs import Background, JobQueue
-from cubestack.firmware_model.cubesense.links.image_sender import ImageSender
 from cubestack.firmware_model.cubesense.measurement import Measurement
 from cubestack.firmware_model.cubesense.state import State
 from cubestack.firmware_model.interface.codec.letters import Letter

@@ -16,7 +16,7 @@ from cubestack.firmware_model.cubesense.telemetry import Telemetry
 from cubestack.firmware_model.cubesense.vision.lens_check import invertible
 from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.firmware_model.interface.codec.message import Message
-from cubestack.firmware_model.interface.codec.node_codes import AckError
+from cubestack.firmware_model.interface.codec.node_messages import AckError
 from cubestack.firmware_model.interface.cubesense import INTERFACE, codes
 from cubestack.firmware_model.interface.cubesense.telemetry import SCHEDULES
 from cubestack.firmware_model.node.link import BusFlags, LinkFlags, SatelliteLink

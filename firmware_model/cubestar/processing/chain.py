@@ -16,7 +16,7 @@ from cubestack.firmware_model.cubestar.capture import ImageCapture
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.cubestar.detection import SearchEnd
 from cubestack.firmware_model.cubestar.matching.identification import Identification
-from cubestack.firmware_model.cubestar.processing import quality
+from cubestack.firmware_model.cubestar.processing import estimate
 from cubestack.firmware_model.cubestar.processing.estimate import Estimate, by_errors, by_votes
 from cubestack.firmware_model.cubestar.processing.identify import (
     FEWEST_STARS,
@@ -102,12 +102,12 @@ class Processing:
     def _report(self, reason: Reason) -> None:
         """Report in telemetry Quality why there is no attitude, if the switches want it rated."""
         if self._switches.estimate != "votes":
-            self.state.quality = quality.picture_values(self.results, reason)
+            self.state.quality = estimate.picture_values(self.results, reason)
 
     def _report_outcome(self, outcome: MatchOutcome) -> None:
         detection = self.results.detection
         self._report(
-            quality.reason_of(None if detection is None else detection.statistics, outcome)
+            estimate.reason_of(None if detection is None else detection.statistics, outcome)
         )
 
     # --- detection ----------------------------------------------------------------------------
@@ -214,7 +214,7 @@ class Processing:
         self._record("attitude", (yield from phases.end(self.state, "attitude_us", started_us)))
         if found.rating is not None:
             reason = Reason.SOLVED if believed else Reason.CONTRADICTION
-            self.state.quality = quality.rated(results, identification, found.rating, reason)
+            self.state.quality = estimate.rated(results, identification, found.rating, reason)
         if not believed:
             return self._fail(TaskStatus.CALCULATION_FAILED, "IDError")
         self.state.attitude = attitude

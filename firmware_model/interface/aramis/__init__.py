@@ -25,7 +25,7 @@ from cubestack.firmware_model.interface.aramis.telecommands import (
 )
 from cubestack.firmware_model.interface.aramis.telemetry import PHASES, TELEMETRY
 from cubestack.firmware_model.interface.codec.message import Interface
-from cubestack.firmware_model.interface.codec.node_codes import AckError
+from cubestack.firmware_model.interface.codec.node_messages import AckError
 
 __all__ = [
     "BLOCK_BYTES",

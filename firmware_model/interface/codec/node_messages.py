@@ -4,12 +4,23 @@ They are those of the CubeSpace family's nodes; ``firmware_model.node.program`` 
 """
 
 from collections.abc import Iterable, Mapping
+from enum import IntEnum
 from types import MappingProxyType
 from typing import Any
 
 from cubestack.firmware_model.interface.codec.field import enum8, flags_at, u8, u16
 from cubestack.firmware_model.interface.codec.message import Interface, Message
-from cubestack.firmware_model.interface.codec.node_codes import AckError
+
+
+class AckError(IntEnum):
+    """Error byte of a telecommand's acknowledge."""
+
+    OK = 0
+    INVALID_ID = 1
+    WRONG_LENGTH = 2
+    BAD_PARAMETER = 3
+    BUFFER_FULL = 4  # an extension: the published list ends at 3
+
 
 #: Error flags of its link to the host, with their causes.
 NODE_FLAGS = {

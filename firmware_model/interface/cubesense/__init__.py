@@ -7,7 +7,7 @@ both I2C addresses, the register addresses, telecommands from 100 and telemetry 
 """
 
 from cubestack.firmware_model.interface.codec.message import Interface
-from cubestack.firmware_model.interface.codec.node_codes import AckError
+from cubestack.firmware_model.interface.codec.node_messages import AckError
 from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
 from cubestack.firmware_model.interface.cubesense.service_port import SERVICE_PORT
 from cubestack.firmware_model.interface.cubesense.switches import CubeSenseSwitches

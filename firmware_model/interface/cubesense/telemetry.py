@@ -10,8 +10,7 @@ from functools import partial
 
 from cubestack.firmware_model.interface.codec.field import Field, byte_array, i16, u8, u16
 from cubestack.firmware_model.interface.codec.message import Confidence, Message
-from cubestack.firmware_model.interface.codec.node_codes import AckError
-from cubestack.firmware_model.interface.codec.node_messages import IDENTIFICATION
+from cubestack.firmware_model.interface.codec.node_messages import IDENTIFICATION, AckError
 from cubestack.firmware_model.interface.cubesense import codes
 from cubestack.firmware_model.interface.cubesense.extensions import EXTENSIONS
 

@@ -7,7 +7,7 @@ through a page (SetCameraRegisterPage); telemetry 138 is rejected as an unknown 
 """
 
 from cubestack.firmware_model.interface.codec.message import Interface
-from cubestack.firmware_model.interface.codec.node_codes import AckError
+from cubestack.firmware_model.interface.codec.node_messages import AckError
 from cubestack.firmware_model.interface.cubestar.codes import (
     IdMode,
     ImageBlockSize,

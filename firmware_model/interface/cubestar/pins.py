@@ -1,4 +1,4 @@
-"""Pins of CubeStar's FPGA boards, each table in the order of the gateware's ports.
+"""CubeStar's memory layouts, and the pins of their FPGAs in the order of the gateware's ports.
 
 CubeStar thesis, table C.2, for the published board (option 1 of section 3.3). The boards on the
 processor's external bus, options 2 and 3 of that section and two boards of option 2 (section 7.2),
@@ -6,7 +6,31 @@ were not built: their pins are assumed, and keep those of the published board wh
 is assumed too: the published board's memory holds two images, but no pin selects one.
 """
 
+from enum import Enum
+from typing import Never
+
 from cubestack.firmware_model.interface.pins import Pin, sram_pins
+
+
+class Layout(Enum):
+    """Connections of camera, FPGA, SRAM and processor, named as on the command line.
+
+    Other names raise ValueError.
+    """
+
+    COPIED = "1"  #: option 1, the published one: an SRAM for the FPGA, one for the processor
+
+    SHARED = "2"  #: option 2: one SRAM, the FPGA as bus switch
+
+    TWO_MEMORIES = "3"  #: option 3: two SRAMs at one FPGA, used alternately
+
+    TWO_BOARDS = "two-boards"  #: section 7.2: two boards of option 2 on one bus, used alternately
+
+    @classmethod
+    def _missing_(cls, value: object) -> Never:
+        names = ", ".join(layout.value for layout in cls)
+        raise ValueError(f"{value!r} is none of the layouts {names}")
+
 
 PIXCLK = Pin("PIXCLK", "input", "pixel clock")
 PIXDATA = Pin("PIXDATA", "input", "pixel data from the image sensor", 8)

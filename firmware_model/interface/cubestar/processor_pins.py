@@ -6,10 +6,13 @@ PA0..PA6, PD9..PD12, PF3..PF5), the crystals (PB7, PB8, PB13, PB14) and the debu
 free, and has the eight data pins of the FPGA side by side, so that a byte is one read of a port.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
-from cubestack.firmware_model.interface.cubestar import pins
+from cubestack.firmware_model.interface.cubestar import INTERFACE, pins
+from cubestack.firmware_model.interface.efm32gg import LAYOUTS
 from cubestack.firmware_model.interface.efm32gg.pins import ROUTES, pin_number
+from cubestack.firmware_model.interface.efm32gg.table import Processor
 
 #: Pins to the FPGA board of the published layout, by the FPGA's names; for DATA, its bit 0.
 FPGA = {
@@ -72,3 +75,53 @@ Bus mode D8A24ALE, address latch and strobes at location 0. The other layouts ha
 def port_pin(name: str) -> tuple[int, int]:
     """Port number and bit of a pin, by its name."""
     return divmod(pin_number(name), 16)
+
+
+_UNITS = {
+    "SATELLITE_UART": SATELLITE_UART,
+    "SATELLITE_I2C": SATELLITE_I2C,
+    "CAMERA_I2C": CAMERA_I2C,
+}
+
+
+def pins_header() -> str:
+    """The header's text, which must follow the header of the part's registers."""
+    return "\n".join(["/* What the processor is connected to. */", *_lines(), ""])
+
+
+def _lines() -> Iterator[str]:
+    for name, pin in FPGA.items():
+        yield _pin(f"FPGA_{name}", pin)
+    yield _pin("CAMERA_RESET", CAMERA_RESET)
+    for number, pin in enumerate(LEDS):
+        yield _pin(f"LED{number}", pin)
+    for title, unit in _UNITS.items():
+        yield from _unit(title, unit)
+    yield f"#define SATELLITE_BAUD {INTERFACE.baud}u"
+    yield f"#define SATELLITE_ADDRESS 0x{INTERFACE.i2c_address:02X}u"
+    for channel, monitor in MONITORS.items():
+        title = channel.upper()
+        yield _pin(f"{title}_SWITCH", SWITCHES[channel])
+        yield f"#define {title}_ADC_CHANNEL {monitor.adc_channel}u"
+        yield f"#define {title}_COMPARATOR ACMP{monitor.comparator}"
+        yield f"#define {title}_COMPARATOR_CHANNEL {monitor.comparator_channel}u"
+        yield f"#define {title}_MA_PER_VOLT {1000 / monitor.volts_per_a!r}f"
+    yield f"#define SUPPLY_VOLTS {SUPPLY_VOLTS!r}f"
+    yield f"#define EXTERNAL_RAM 0x{EXTERNAL_RAM:08X}u"
+
+
+def _unit(title: str, unit: Unit) -> Iterator[str]:
+    yield f"#define {title} {unit.name}"
+    yield f"#define {title}_LOCATION {unit.location}u"
+    yield f"#define {title}_CLOCK CMU_HFPERCLKEN0_{unit.name}"
+    for signal in unit.signals:
+        yield f"#define {title}_{signal}_PIN {unit.pin(signal)}u"
+    for way in ("_RX", "_TX") if "TX" in unit.signals else ("",):
+        yield f"#define {title}{way}_IRQ {unit.name}{way}_IRQ"
+
+
+def _pin(name: str, pin: str) -> str:
+    return f"#define {name} {pin_number(pin)}u /* {pin} */"
+
+
+PROCESSOR = Processor("EFM32GG280F1024", LAYOUTS, pins_header)

@@ -7,8 +7,7 @@ from amaranth.hdl import Assert, Module
 
 from cubestack.firmware_model.interface.cubestar.pins import DOUBLE, SHARED
 from cubestack.hdl.cubestar.double_top import CubeStarDouble
-from cubestack.hdl.cubestar.shared_top import CubeStarShared
-from cubestack.hdl.cubestar.two_boards import CubeStarTwoBoards
+from cubestack.hdl.cubestar.shared_top import CubeStarShared, CubeStarTwoBoards
 from cubestack.hdl.proofs import properties
 from cubestack.hdl.proofs.cubestar import published
 from cubestack.hdl.proofs.cubestar.published import inside

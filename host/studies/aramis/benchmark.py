@@ -8,7 +8,7 @@ from cubestack.emulator.camera.common.register_file import RegisterFile
 from cubestack.emulator.camera.mt9m001.imager import Mt9m001Imager
 from cubestack.emulator.camera.mt9m001.lens import CONDITION
 from cubestack.emulator.camera.mt9m001.registers import read_settings
-from cubestack.firmware_model.aramis.detection.background import LevelHistory
+from cubestack.firmware_model.aramis.detection.mask import LevelHistory
 from cubestack.firmware_model.aramis.pipeline import VERIFIED, solve
 from cubestack.firmware_model.interface.aramis import MeasurementMode
 from cubestack.firmware_model.interface.cameras.mt9m001 import REGISTERS

@@ -13,7 +13,7 @@ from typing import Any
 from cubestack.firmware_model.cubesense.memory import CAPACITY, budget, report, used
 from cubestack.firmware_model.interface.codec.switches import DEFAULT_PROFILE, PROFILES
 from cubestack.firmware_model.interface.cubesense.switches import CubeSenseSwitches
-from cubestack.firmware_model.mcu.memory_budget import Buffer
+from cubestack.firmware_model.mcu.memory import Buffer
 from cubestack.firmware_model.values import choice, text
 from cubestack.host.devices.device import Shown
 from cubestack.host.experiments.facts import Facts, Lookup

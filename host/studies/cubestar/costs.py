@@ -20,8 +20,7 @@ from cubestack.emulator.camera.common.star_sensor import StarSensor
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.firmware_model.interface.efm32gg import LAYOUTS
 from cubestack.firmware_model.interface.efm32gg.c_header import c_header
-from cubestack.firmware_model.mcu.compiled import FILE
-from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
+from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3, FILE
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.host.devices.registry import device
 from cubestack.host.emulation.emulated import power_up

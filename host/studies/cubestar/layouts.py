@@ -23,7 +23,7 @@ from typing import Any
 from cubestack.emulator.boards.cubestar.board import CubeStarBoard
 from cubestack.emulator.boards.cubestar.layouts import BOARDS, fpga_of
 from cubestack.firmware_model.cubestar.state import ATTITUDE_PAGE, Attitude
-from cubestack.firmware_model.interface.cubestar.layouts import Layout
+from cubestack.firmware_model.interface.cubestar.pins import Layout
 from cubestack.firmware_model.values import whole
 from cubestack.host.devices.experiment import Experiment, Result
 from cubestack.host.experiments.attitude import errors, is_right

@@ -22,8 +22,7 @@ from cubestack.emulator.boards.cubestar.layouts import BOARDS
 from cubestack.emulator.camera.mlx75412.lens import CONDITION
 from cubestack.emulator.rtl.contract import RtlEngine
 from cubestack.emulator.rtl.wiring import Wiring
-from cubestack.firmware_model.interface.cubestar.layouts import Layout
-from cubestack.firmware_model.interface.cubestar.pins import BOARD_PREFIXES, ENABLE, RNW
+from cubestack.firmware_model.interface.cubestar.pins import BOARD_PREFIXES, ENABLE, RNW, Layout
 from cubestack.firmware_model.values import choice
 from cubestack.host.clients.cubestar.client import CubeStar
 from cubestack.host.emulation.emulated import EmulatedDevice

@@ -21,9 +21,8 @@ from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.emulator.sim.fpga_port import Transactions
 from cubestack.firmware_model.mcu.external_bus import BusTiming
 from cubestack.hdl.cubestar.double_top import CubeStarDouble
-from cubestack.hdl.cubestar.shared_top import CubeStarShared
+from cubestack.hdl.cubestar.shared_top import CubeStarShared, CubeStarTwoBoards
 from cubestack.hdl.cubestar.top import CubeStarTop
-from cubestack.hdl.cubestar.two_boards import CubeStarTwoBoards
 
 from .cameras import plain_camera, random_camera
 from .comparison import Step, assert_same, engines

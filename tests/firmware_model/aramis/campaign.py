@@ -19,7 +19,7 @@ from cubestack.firmware_model.aramis.settings import StoredSettings
 from cubestack.firmware_model.aramis.solution import Profile
 from cubestack.firmware_model.interface.aramis import MeasurementOutcome
 from cubestack.firmware_model.interface.aramis.switches import AramisSwitches
-from cubestack.firmware_model.mcu.flash_store import FlashStore
+from cubestack.firmware_model.mcu.memory import FlashStore
 
 from .sky import FIELD, Light, database, in_published_sense, is_right, meter, misnamed, picture
 

@@ -3,11 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.aramis.memory import FLASH_BYTES, SDRAM_BYTES
+from cubestack.firmware_model.aramis.hardware import FLASH_BYTES, SDRAM_BYTES
 from cubestack.firmware_model.interface.aramis import INTERFACE
 from cubestack.firmware_model.interface.cameras.mt9m001 import REGISTERS
 from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
-from cubestack.firmware_model.mcu.flash_store import FlashStore
+from cubestack.firmware_model.mcu.memory import FlashStore
 from cubestack.firmware_model.mcu.requests import CameraTransfer
 
 from ..host_side import HostSide

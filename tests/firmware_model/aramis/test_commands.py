@@ -2,7 +2,7 @@ import pytest
 
 from cubestack.firmware_model.aramis.program import AramisProgram
 from cubestack.firmware_model.interface.aramis import INTERFACE
-from cubestack.firmware_model.node.queue import QueuedCommand
+from cubestack.firmware_model.node.commands import QueuedCommand
 
 from .harness import Harness
 

@@ -6,7 +6,7 @@ from cubestack.firmware_model.interface.aramis import INTERFACE, AckError
 from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.mcu.requests import Routine, Sleep
-from cubestack.firmware_model.node.queue import QueuedCommand
+from cubestack.firmware_model.node.commands import QueuedCommand
 
 from .harness import Harness
 

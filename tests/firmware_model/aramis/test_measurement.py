@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from cubestack.firmware_model.aramis.detection.spikes import SpikeRemoval
+from cubestack.firmware_model.aramis.detection.mask import SpikeRemoval
 from cubestack.firmware_model.aramis.measurement import Measuring, configuration
 from cubestack.firmware_model.aramis.pipeline import VERIFIED, DetectionSettings
 from cubestack.firmware_model.aramis.settings import StoredSettings
@@ -16,7 +16,7 @@ from cubestack.firmware_model.interface.aramis import INTERFACE, MeasurementOutc
 from cubestack.firmware_model.interface.aramis.switches import AramisSwitches
 from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
 from cubestack.firmware_model.mcu.costs import Meter
-from cubestack.firmware_model.mcu.flash_store import FlashStore
+from cubestack.firmware_model.mcu.memory import FlashStore
 
 EXTENDED = AramisSwitches.of("extended")
 

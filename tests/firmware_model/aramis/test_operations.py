@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 
 from cubestack.firmware_model.aramis.catalogue.hamming import decode, encode
-from cubestack.firmware_model.aramis.detection.background import LevelHistory
-from cubestack.firmware_model.aramis.detection.spikes import SpikeRemoval
+from cubestack.firmware_model.aramis.detection.mask import LevelHistory, SpikeRemoval
 from cubestack.firmware_model.aramis.field import CameraField
 from cubestack.firmware_model.aramis.matching.identification import identify
 from cubestack.firmware_model.aramis.matching.shutter import at_middle_row

@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.aramis.detection.background import LevelHistory
-from cubestack.firmware_model.aramis.detection.spikes import SpikeRemoval
+from cubestack.firmware_model.aramis.detection.mask import LevelHistory, SpikeRemoval
 from cubestack.firmware_model.aramis.pipeline import PUBLISHED, VERIFIED, Configuration, detect
 from cubestack.firmware_model.aramis.pipeline import solve as solve_picture
 from cubestack.firmware_model.aramis.solution import Solution, StarList

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.aramis.detection.background import LevelHistory
+from cubestack.firmware_model.aramis.detection.mask import LevelHistory
 from cubestack.firmware_model.aramis.pipeline import PUBLISHED, VERIFIED, Configuration, solve
 from cubestack.firmware_model.interface.aramis import MeasurementOutcome, Reason
 

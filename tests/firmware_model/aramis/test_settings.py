@@ -3,7 +3,7 @@ from typing import Any
 import pytest
 
 from cubestack.firmware_model.aramis.settings import BODY_PAGE, CONFIG_PAGE, StoredSettings
-from cubestack.firmware_model.mcu.flash_store import FlashStore
+from cubestack.firmware_model.mcu.memory import FlashStore
 
 TURN = {"Q0": 0.0, "Q1": 0.0, "Q2": 1.0, "Q3": 0.0}
 

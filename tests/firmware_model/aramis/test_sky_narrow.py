@@ -14,7 +14,7 @@ from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from cubestack.emulator.boards.aramis.catalogue import CatalogueParameters
-from cubestack.firmware_model.aramis.detection.background import LevelHistory
+from cubestack.firmware_model.aramis.detection.mask import LevelHistory
 from cubestack.firmware_model.aramis.field import CameraField
 from cubestack.firmware_model.aramis.pipeline import PUBLISHED, VERIFIED, Configuration, solve
 from cubestack.firmware_model.aramis.solution import Solution

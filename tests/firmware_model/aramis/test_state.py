@@ -4,7 +4,7 @@ from cubestack.firmware_model.aramis.settings import CONFIG_PAGE
 from cubestack.firmware_model.aramis.state import Clock, State
 from cubestack.firmware_model.interface.aramis import MS_PER_DAY, MeasurementOutcome, SensorState
 from cubestack.firmware_model.interface.codec.field import InterfaceError
-from cubestack.firmware_model.mcu.flash_store import FlashStore
+from cubestack.firmware_model.mcu.memory import FlashStore
 
 
 def test_the_clock_counts_on_over_noon() -> None:

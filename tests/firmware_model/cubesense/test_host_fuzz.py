@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from cubestack.firmware_model.interface.codec.node_codes import AckError
+from cubestack.firmware_model.interface.codec.node_messages import AckError
 from cubestack.firmware_model.interface.cubesense import INTERFACE
 from cubestack.firmware_model.interface.cubesense.codes import Camera, DetectResult, ImageSize, Sram
 from cubestack.firmware_model.interface.cubesense.registers import REGISTERS

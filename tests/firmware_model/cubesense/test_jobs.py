@@ -3,7 +3,7 @@ import pytest
 from cubestack.firmware_model.cubesense.jobs import Background, JobQueue, Measure
 from cubestack.firmware_model.interface.cubesense.codes import Camera, Sram
 from cubestack.firmware_model.mcu.requests import Pay, Routine
-from cubestack.firmware_model.node.queue import QUEUE_DEPTH
+from cubestack.firmware_model.node.commands import QUEUE_DEPTH
 
 
 def nothing() -> Routine[None]:

@@ -7,11 +7,11 @@ import pytest
 from cubestack.firmware_model.cubesense.state import CameraResult
 from cubestack.firmware_model.cubesense.telemetry import NODE_TYPE
 from cubestack.firmware_model.cubesense.vision.masks import Mask
-from cubestack.firmware_model.interface.codec.node_codes import AckError
+from cubestack.firmware_model.interface.codec.node_messages import AckError
 from cubestack.firmware_model.interface.codec.switch_messages import shown_values
 from cubestack.firmware_model.interface.cubesense import INTERFACE, codes, telemetry
 from cubestack.firmware_model.interface.cubesense.switches import CubeSenseSwitches
-from cubestack.firmware_model.node.identification import FIRMWARE_VERSION
+from cubestack.firmware_model.node.state import FIRMWARE_VERSION
 
 from .links_harness import Links
 

@@ -18,7 +18,7 @@ from cubestack.firmware_model.interface.cameras.mlx75412 import REGISTERS
 from cubestack.firmware_model.interface.cubestar import INTERFACE, ResetCause, TaskStatus
 from cubestack.firmware_model.interface.cubestar.switches import DEFAULT_SWITCHES, CubeStarSwitches
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
-from cubestack.firmware_model.mcu.flash_store import FlashStore
+from cubestack.firmware_model.mcu.memory import FlashStore
 from cubestack.firmware_model.mcu.requests import (
     AwaitPin,
     CameraTransfer,

@@ -10,7 +10,7 @@ from cubestack.firmware_model.cubestar.configuration import (
 from cubestack.firmware_model.cubestar.detection import DetectionConfig
 from cubestack.firmware_model.cubestar.state import SETTING_COMMANDS
 from cubestack.firmware_model.interface.cubestar import INTERFACE
-from cubestack.firmware_model.node.settings import Settings
+from cubestack.firmware_model.node.state import Settings
 
 
 def reset_settings() -> Settings:

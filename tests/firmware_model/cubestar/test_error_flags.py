@@ -13,7 +13,7 @@ from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.interface.codec.switches import DEFAULT_PROFILE
 from cubestack.firmware_model.interface.cubestar import INTERFACE, AckError, IdMode
 from cubestack.firmware_model.interface.cubestar.flags import NEVER_RAISED
-from cubestack.firmware_model.node.queue import QUEUE_DEPTH
+from cubestack.firmware_model.node.commands import QUEUE_DEPTH
 
 from .harness import Harness
 from .sky import Sky, draw, take

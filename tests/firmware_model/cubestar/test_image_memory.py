@@ -10,11 +10,11 @@ from cubestack.firmware_model.cubestar.memory import RETENTION_BYTES
 from cubestack.firmware_model.cubestar.state import State
 from cubestack.firmware_model.cubestar.supply import SupplyMonitor
 from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES
-from cubestack.firmware_model.interface.cubestar.layouts import Layout
+from cubestack.firmware_model.interface.cubestar.pins import Layout
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.external_bus import EBI
-from cubestack.firmware_model.mcu.flash_store import FlashStore
+from cubestack.firmware_model.mcu.memory import FlashStore
 from cubestack.firmware_model.mcu.requests import BusAccess, Request
 
 from ..runner import Runner

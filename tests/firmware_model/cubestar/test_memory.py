@@ -9,7 +9,7 @@ from cubestack.firmware_model.cubestar.state import State
 from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
 from cubestack.firmware_model.mcu.costs import Meter
-from cubestack.firmware_model.mcu.memory_budget import Buffer, Memory, used
+from cubestack.firmware_model.mcu.memory import Buffer, Memory, used
 
 PROGRAM_RAM = 32 * 1024
 """Left for what the model does not have: library data, other peripherals' buffers."""

@@ -10,7 +10,7 @@ from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.cubestar.state import FLASH_ENDURANCE
 from cubestack.firmware_model.interface.cubestar import IdMode, MatchMode
 from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitches
-from cubestack.firmware_model.mcu.flash_store import FlashStore
+from cubestack.firmware_model.mcu.memory import FlashStore
 
 from .harness import Harness
 from .sky import Sky, error_deg, take

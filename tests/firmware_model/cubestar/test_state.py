@@ -11,7 +11,7 @@ from cubestack.firmware_model.interface.codec.field import InterfaceError
 from cubestack.firmware_model.interface.cubestar import INTERFACE, MatchMode
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
 from cubestack.firmware_model.mcu.costs import Meter
-from cubestack.firmware_model.mcu.flash_store import FlashStore
+from cubestack.firmware_model.mcu.memory import FlashStore
 
 COUNTERS = [field.name for field in fields(Retained)]
 FLAGS = [field.name for field in INTERFACE.telemetry("ErrorFlags").fields]

@@ -2,7 +2,7 @@ from collections.abc import Callable
 
 import pytest
 
-from cubestack.firmware_model.cubestar.tasks import TASKS
+from cubestack.firmware_model.cubestar.link import TASKS
 from cubestack.firmware_model.interface.cubestar import AckError, TaskStatus
 from cubestack.firmware_model.mcu.requests import CameraTransfer, Pay, Request
 

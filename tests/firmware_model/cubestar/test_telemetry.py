@@ -13,7 +13,7 @@ from cubestack.firmware_model.interface.cubestar import (
     ResetCause,
     TaskStatus,
 )
-from cubestack.firmware_model.node.identification import FIRMWARE_VERSION, SERIAL_NUMBER
+from cubestack.firmware_model.node.state import FIRMWARE_VERSION, SERIAL_NUMBER
 
 from ..registry import registered_in
 from .harness import Harness

@@ -1,4 +1,4 @@
-from cubestack.firmware_model.mcu.flash_store import FlashStore
+from cubestack.firmware_model.mcu.memory import FlashStore
 
 
 def test_pages_keep_what_was_written_last_and_their_writes_are_counted() -> None:

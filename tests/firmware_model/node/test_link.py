@@ -21,14 +21,14 @@ from cubestack.firmware_model.cubestar.state import State as CubeStarState
 from cubestack.firmware_model.interface.aramis import INTERFACE as ARAMIS
 from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.firmware_model.interface.codec.message import Interface, Message
-from cubestack.firmware_model.interface.codec.node_codes import AckError
+from cubestack.firmware_model.interface.codec.node_messages import AckError
 from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
 from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
 from cubestack.firmware_model.mcu.costs import CostTable
-from cubestack.firmware_model.mcu.flash_store import FlashStore
+from cubestack.firmware_model.mcu.memory import FlashStore
+from cubestack.firmware_model.node.commands import QUEUE_DEPTH
 from cubestack.firmware_model.node.link import SatelliteLink, longest_command
-from cubestack.firmware_model.node.queue import QUEUE_DEPTH
 from cubestack.firmware_model.node.state import NodeState
 
 from ..cubesense.links_harness import Links

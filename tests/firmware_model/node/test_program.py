@@ -7,12 +7,11 @@ import pytest
 
 from cubestack.firmware_model.interface.codec.field import u8, u16
 from cubestack.firmware_model.interface.codec.message import Message
-from cubestack.firmware_model.interface.codec.node_codes import AckError
-from cubestack.firmware_model.interface.codec.node_messages import node_interface
+from cubestack.firmware_model.interface.codec.node_messages import AckError, node_interface
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
 from cubestack.firmware_model.mcu.requests import ReadTimer, Routine, Sleep
+from cubestack.firmware_model.node.commands import QUEUE_DEPTH
 from cubestack.firmware_model.node.program import TELECOMMAND, Action, NodeProgram, Source
-from cubestack.firmware_model.node.queue import QUEUE_DEPTH
 
 from ..host_side import HostSide
 from ..runner import Runner

@@ -6,7 +6,7 @@ from cubestack.firmware_model.cubestar.state import SETTING_COMMANDS as CUBESTAR
 from cubestack.firmware_model.interface.aramis import INTERFACE as ARAMIS
 from cubestack.firmware_model.interface.codec.message import Interface
 from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
-from cubestack.firmware_model.node.settings import Settings
+from cubestack.firmware_model.node.state import Settings
 
 NODES = {CUBESTAR.name: (CUBESTAR, CUBESTAR_SETTINGS), ARAMIS.name: (ARAMIS, ARAMIS_SETTINGS)}
 

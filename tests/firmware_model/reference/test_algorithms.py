@@ -31,7 +31,7 @@ from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitches
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
 from cubestack.firmware_model.mcu.costs import Meter
-from cubestack.firmware_model.node.settings import Settings
+from cubestack.firmware_model.node.state import Settings
 from cubestack.firmware_model.star_tracker.search import MatchOutcome
 from cubestack.host.studies.cubestar.reference_catalogue import catalogue_tables
 from tests.tiers import quick

@@ -5,9 +5,8 @@ import pytest
 from amaranth.lib.wiring import Component
 
 from cubestack.hdl.blocks.bus_port import BusPort
-from cubestack.hdl.blocks.frame_gap import FrameGap
-from cubestack.hdl.blocks.gray_counter import GrayCounter
-from cubestack.hdl.blocks.matrix_counter import MatrixCounter
+from cubestack.hdl.blocks.counters import GrayCounter, MatrixCounter
+from cubestack.hdl.blocks.frames import FrameGap
 
 
 @pytest.mark.parametrize(

@@ -4,9 +4,8 @@ from typing import Any
 
 import pytest
 
-from cubestack.hdl.blocks.frame_reader import FrameReader
-from cubestack.hdl.blocks.frame_writer import FrameWriter
-from cubestack.hdl.blocks.matrix_counter import MatrixCounter
+from cubestack.hdl.blocks.counters import MatrixCounter
+from cubestack.hdl.blocks.frames import FrameReader, FrameWriter
 from tests.tiers import quick
 
 SMALL = [(5, 3), (8, 4)]

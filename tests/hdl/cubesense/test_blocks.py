@@ -9,8 +9,8 @@ from amaranth.hdl import ClockDomain, ClockSignal, Module, ResetSignal
 from amaranth.lib.wiring import Component, In
 
 from cubestack.firmware_model.interface.cubesense.fpga import ReadOut
-from cubestack.hdl.blocks.frame_gap import FrameGap
-from cubestack.hdl.blocks.gray_counter import GrayCounter
+from cubestack.hdl.blocks.counters import GrayCounter
+from cubestack.hdl.blocks.frames import FrameGap
 from cubestack.hdl.blocks.pinned import connect_ports
 from cubestack.hdl.cubesense.dataflow import DataflowControl
 from cubestack.hdl.cubesense.nadir_scan import NadirScan

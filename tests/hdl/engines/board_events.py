@@ -18,9 +18,8 @@ from cubestack.firmware_model.interface.cubesense.fpga import Action
 from cubestack.hdl.cubesense.pair import CubeSensePair
 from cubestack.hdl.cubestar.board import CubeStarBoard
 from cubestack.hdl.cubestar.double_top import CubeStarDouble
-from cubestack.hdl.cubestar.shared_top import CubeStarShared
+from cubestack.hdl.cubestar.shared_top import CubeStarShared, CubeStarTwoBoards
 from cubestack.hdl.cubestar.top import CubeStarTop
-from cubestack.hdl.cubestar.two_boards import CubeStarTwoBoards
 from tests.hdl.regression import SMALLEST
 
 SPACING_PS = 10  #: Between two events at least; a bench in Verilog needs some of it to settle

@@ -7,7 +7,7 @@ from typing import Any
 from amaranth.hdl import ClockDomain, ClockSignal, Module, ResetSignal
 from amaranth.lib.wiring import Component, In
 
-from cubestack.hdl.blocks.matrix_counter import MatrixCounter
+from cubestack.hdl.blocks.counters import MatrixCounter
 from cubestack.hdl.blocks.pinned import connect_ports
 from cubestack.hdl.cubestar.shared_top import CubeStarShared
 from tests.hdl.cubestar.as_published import AsPublished, DoubleAsPublished, SharedAsPublished

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from cubestack.hdl.blocks import matrix_counter
+from cubestack.hdl.blocks import counters
 from cubestack.hdl.flow.tools import have_yosys
 from tests.hdl.mutants.equivalence import Equivalence
 from tests.hdl.mutants.netlist import Mutant, Netlist, mutants, netlist, selectable
@@ -74,7 +74,7 @@ def test_finds_differences_and_unreset_state(every: list[Mutant], equivalence: E
 
 def test_where_no_state_differs_is_proved(every: list[Mutant], equivalence: Equivalence) -> None:
     """The last column is 2, so its lower bit need not be looked at: 3 never comes."""
-    text = Path(matrix_counter.__file__).read_text(encoding="utf-8").splitlines()
+    text = Path(counters.__file__).read_text(encoding="utf-8").splitlines()
     (line,) = (n for n, row in enumerate(text, 1) if "self.last_column.eq(" in row)
     wanted = ("const0", "A", 0, f"matrix_counter.py:{line}")
     last = next(m for m in every if (m.mode, m.port, m.bit, *m.source) == wanted)

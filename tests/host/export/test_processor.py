@@ -9,7 +9,7 @@ import pytest
 from cmsis_svd.parser import SVDParser
 from lxml import etree
 
-from cubestack.firmware_model.interface.cubestar.processor_header import PROCESSOR
+from cubestack.firmware_model.interface.cubestar.processor_pins import PROCESSOR
 from cubestack.host.cli.main import main
 from cubestack.host.devices.registry import devices
 from cubestack.host.export.processor import processor_header, render_processor, svd

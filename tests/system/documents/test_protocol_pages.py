@@ -4,7 +4,7 @@ from dataclasses import replace
 import pytest
 
 from cubestack.emulator.scene.sky import SkyScene
-from cubestack.firmware_model.cubestar.tasks import TASKS
+from cubestack.firmware_model.cubestar.link import TASKS
 from cubestack.firmware_model.interface.cubestar import INTERFACE, TaskStatus
 from cubestack.host.emulation.emulated import open_device
 from tests.system.conftest import ROOT

@@ -3,7 +3,7 @@ import pytest
 
 from cubestack.emulator.faults.declaration import FaultError
 from cubestack.firmware_model.aramis.catalogue.hamming import CODED_BYTES, DATA_BYTES
-from cubestack.firmware_model.aramis.memory import CATALOGUE_AT, PICTURES_AT
+from cubestack.firmware_model.aramis.hardware import CATALOGUE_AT, PICTURES_AT
 from cubestack.firmware_model.interface.aramis import CatalogueState, LatchUpStep, Reason
 
 from .bench import Tracker

@@ -4,7 +4,7 @@ from collections.abc import Set
 import pytest
 from smbus2 import i2c_msg
 
-from cubestack.firmware_model.interface.codec.node_codes import AckError
+from cubestack.firmware_model.interface.codec.node_messages import AckError
 from cubestack.host.clients.i2c import I2cClient
 
 from .bench import Bench

@@ -9,7 +9,7 @@ from cubestack.firmware_model.interface.aramis import INTERFACE as ARAMIS
 from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
 from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
 from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
-from cubestack.firmware_model.node.identification import FIRMWARE_VERSION
+from cubestack.firmware_model.node.state import FIRMWARE_VERSION
 
 from .conftest import LATCH, Run, needs_tools
 

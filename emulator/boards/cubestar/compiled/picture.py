@@ -20,7 +20,7 @@ from cubestack.firmware_model.cubestar.state import SETTING_COMMANDS
 from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitches
 from cubestack.firmware_model.mcu.costs import Meter
-from cubestack.firmware_model.node.settings import Settings
+from cubestack.firmware_model.node.state import Settings
 
 #: Phases in the order of ``enum phase`` in firmware_model/reference/costs/phases.h.
 PHASES = (

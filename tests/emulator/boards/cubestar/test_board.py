@@ -12,7 +12,7 @@ from cubestack.emulator.native.compiler import find_compiler
 from cubestack.emulator.scene.attitude import attitude_error_deg
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S
-from cubestack.firmware_model.interface.cubestar.layouts import Layout
+from cubestack.firmware_model.interface.cubestar.pins import Layout
 from cubestack.firmware_model.mcu.requests import CameraTransfer, SetPin, Sleep
 
 ENABLE_SENSOR = CameraTransfer(b"\x81\x00\x21")

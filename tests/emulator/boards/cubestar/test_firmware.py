@@ -13,7 +13,7 @@ from cubestack.emulator.scene.sky import SkyScene
 from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S
 from cubestack.firmware_model.interface.cameras.mlx75412 import REGISTERS
 from cubestack.firmware_model.interface.cubestar import processor_pins as wired
-from cubestack.firmware_model.interface.cubestar.layouts import Layout
+from cubestack.firmware_model.interface.cubestar.pins import Layout
 from cubestack.firmware_model.interface.efm32gg.pins import pin_number
 from tests.emulator.boards.cubestar.builds import build, needs_toolchain
 

@@ -8,7 +8,7 @@ from cubestack.emulator.boards.cubestar.layouts import BOARDS, Fpga, LayoutBoard
 from cubestack.emulator.boards.cubestar.power import CUBESTAR_POWER
 from cubestack.emulator.sim.power import PowerModel
 from cubestack.emulator.sim.virtual_time import Kernel
-from cubestack.firmware_model.interface.cubestar.layouts import Layout
+from cubestack.firmware_model.interface.cubestar.pins import Layout
 
 FPGA = CUBESTAR_POWER.parts["fpga"].ma
 SRAM = CUBESTAR_POWER.parts["memory"].ma

@@ -14,8 +14,8 @@ from cubestack.emulator.rtl.cxxrtl.variants import input_names, members, variant
 from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.firmware_model.interface.cubestar.pins import BOARD_PREFIXES, RNW
 from cubestack.hdl.cubestar.double_top import CubeStarDouble
+from cubestack.hdl.cubestar.shared_top import CubeStarTwoBoards
 from cubestack.hdl.cubestar.top import CubeStarTop
-from cubestack.hdl.cubestar.two_boards import CubeStarTwoBoards
 from cubestack.hdl.flow.generate import rtlil_text
 
 

@@ -3,7 +3,7 @@ import pytest
 
 from cubestack.emulator.boards.aramis.catalogue import CatalogueParameters
 from cubestack.firmware_model.aramis.catalogue.flash_store import CatalogueStore, flash_image
-from cubestack.firmware_model.aramis.memory import CATALOGUE_AT, SECTOR_BYTES
+from cubestack.firmware_model.aramis.hardware import CATALOGUE_AT, SECTOR_BYTES
 from cubestack.firmware_model.interface.aramis import MOST_CATALOGUE_BYTES, CatalogueState
 
 from ..harness import Harness

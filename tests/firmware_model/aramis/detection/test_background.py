@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from cubestack.firmware_model.aramis.detection.background import FRAMES, LevelHistory
+from cubestack.firmware_model.aramis.detection.mask import FRAMES, LevelHistory
 from cubestack.firmware_model.aramis.field import CameraField
 
 from ..sky import meter

@@ -7,8 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.aramis.detection.regions import find_regions
-from cubestack.firmware_model.aramis.detection.smear import smear_px, without_tracks
-from cubestack.firmware_model.aramis.detection.spots import StarSpots
+from cubestack.firmware_model.aramis.detection.spots import StarSpots, smear_px, without_tracks
 from cubestack.firmware_model.aramis.matching.identification import identify
 from cubestack.firmware_model.aramis.pipeline import VERIFIED, detect_locally
 from cubestack.firmware_model.aramis.solution import StarList

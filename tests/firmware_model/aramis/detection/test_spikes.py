@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.aramis.detection.charges import charge_spikes
-from cubestack.firmware_model.aramis.detection.spikes import HALF, SpikeRemoval, remove_spikes
+from cubestack.firmware_model.aramis.detection.mask import HALF, SpikeRemoval, remove_spikes
 
 from ..sky import meter
 

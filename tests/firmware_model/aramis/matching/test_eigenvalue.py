@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from cubestack.firmware_model.aramis.matching.eigenvalue import largest_eigenvalue, quartic
+from cubestack.firmware_model.aramis.matching.identification import largest_eigenvalue, quartic
 from cubestack.firmware_model.attitude.quest import quest
 
 from ..sky import meter

@@ -1,8 +1,8 @@
 import pytest
 
+from cubestack.firmware_model.cubesense.download import CHUNK_BYTES
 from cubestack.firmware_model.cubesense.hardware import Port
 from cubestack.firmware_model.cubesense.links.bench import LETTERS
-from cubestack.firmware_model.cubesense.links.image_sender import CHUNK_BYTES
 from cubestack.firmware_model.interface.cubesense.codes import (
     IMAGE_BYTES,
     Camera,

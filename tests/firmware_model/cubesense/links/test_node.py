@@ -4,7 +4,7 @@ import pytest
 
 from cubestack.firmware_model.cubesense.hardware import Port
 from cubestack.firmware_model.cubesense.links.node import SEND_BYTES
-from cubestack.firmware_model.interface.codec.node_codes import AckError
+from cubestack.firmware_model.interface.codec.node_messages import AckError
 from cubestack.firmware_model.interface.cubesense import INTERFACE, codes, telemetry
 from cubestack.firmware_model.mcu.requests import Request
 

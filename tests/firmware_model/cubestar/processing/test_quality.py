@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.cubestar.detection.contract import PictureStatistics
-from cubestack.firmware_model.cubestar.processing.quality import reason_of
+from cubestack.firmware_model.cubestar.processing.estimate import reason_of
 from cubestack.firmware_model.cubestar.state import UNRATED
 from cubestack.firmware_model.interface.cubestar import Reason
 from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitches

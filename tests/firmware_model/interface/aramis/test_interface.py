@@ -2,7 +2,7 @@
 
 import pytest
 
-from cubestack.firmware_model.aramis.detection.spikes import SpikeRemoval
+from cubestack.firmware_model.aramis.detection.mask import SpikeRemoval
 from cubestack.firmware_model.aramis.solution import Reason as Finding
 from cubestack.firmware_model.interface.aramis import (
     IMAGE_BYTES,

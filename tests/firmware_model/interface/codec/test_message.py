@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from cubestack.firmware_model.interface.cameras.registers import RegisterAccess
 from cubestack.firmware_model.interface.codec.field import InterfaceError, bool1, i16, u8, u16, u32
 from cubestack.firmware_model.interface.codec.message import Interface, Message, MessageKind
-from cubestack.firmware_model.interface.codec.node_codes import AckError
-from cubestack.firmware_model.interface.codec.node_messages import node_telemetry
+from cubestack.firmware_model.interface.codec.node_messages import AckError, node_telemetry
 from cubestack.firmware_model.interface.codec.register_pointer import PointerMap, PointerRegister
 from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
 

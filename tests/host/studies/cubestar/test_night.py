@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from cubestack.firmware_model.interface.cubestar import MatchMode, TaskStatus
-from cubestack.firmware_model.interface.cubestar.layouts import Layout
+from cubestack.firmware_model.interface.cubestar.pins import Layout
 from cubestack.host.experiments.cubestar import measure
 from cubestack.host.studies.cubestar import layouts
 from cubestack.host.studies.cubestar import night as module

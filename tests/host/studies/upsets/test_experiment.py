@@ -7,7 +7,7 @@ import pytest
 
 from cubestack.emulator.boards.cubestar import stack
 from cubestack.emulator.native.compiler import find_compiler
-from cubestack.hdl.blocks import frame_writer
+from cubestack.hdl.blocks import frames
 from cubestack.host.devices.registry import device
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.studies.cubesense import upsets as cubesense
@@ -77,7 +77,7 @@ def test_same_seed_gives_the_same_results() -> None:
 @pytest.fixture
 def voted(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     kept = stack._wiring, experiment._registers
-    monkeypatch.setattr(frame_writer, "MatrixCounter", VotedCounter)
+    monkeypatch.setattr(frames, "MatrixCounter", VotedCounter)
     for cached in kept:
         cached.cache_clear()
     yield

@@ -2,7 +2,7 @@
 
 from amaranth.hdl import Cat, Module, Signal
 
-from cubestack.hdl.blocks.matrix_counter import MatrixCounter
+from cubestack.hdl.blocks.counters import MatrixCounter
 
 
 class VotedCounter(MatrixCounter):

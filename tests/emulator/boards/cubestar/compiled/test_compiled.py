@@ -21,8 +21,7 @@ from cubestack.emulator.boards.cubestar.compiled.machine import Timing, start_pr
 from cubestack.emulator.boards.processor_registers import peek
 from cubestack.emulator.iss.calls import CallError, Calls
 from cubestack.emulator.iss.insight.symbols import Symbols
-from cubestack.firmware_model.mcu.compiled import load_measurements
-from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
+from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3, load_measurements
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.host.studies.cubestar.costs import generated
 from tests.tiers import quick

@@ -1,7 +1,36 @@
-"""Non-volatile memory of a processor."""
+"""Memories of a processor: the buffers of a program in each, and the pages of the flash."""
 
 from dataclasses import dataclass, field
+from enum import Enum
 from itertools import zip_longest
+
+
+class Memory(Enum):
+    """A memory of a processor board."""
+
+    RAM = "RAM"
+    FLASH = "flash"
+    EXTERNAL_RAM = "external SRAM"
+    RETENTION = "retention registers"
+
+
+@dataclass(frozen=True)
+class Buffer:
+    """One buffer of ``size`` bytes, which may lie ``inside`` the buffer of that name."""
+
+    name: str
+    memory: Memory
+    size: int
+    inside: str = ""
+
+
+def used(buffers: tuple[Buffer, ...]) -> dict[Memory, int]:
+    memories = {buffer.memory for buffer in buffers}
+    return {
+        memory: sum(b.size for b in buffers if b.memory is memory and not b.inside)
+        for memory in Memory
+        if memory in memories
+    }
 
 
 @dataclass(eq=False)
