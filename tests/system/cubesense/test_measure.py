@@ -3,11 +3,13 @@
 CubeSense thesis, sections 5.8, 7.1, 7.2, 7.4 and 8.
 """
 
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tests.conftest import Run
 from tests.system.conftest import Frames, Measure
 
 KEYS = {
@@ -129,3 +131,21 @@ def test_scene_file(measure: Measure, tmp_path: Path) -> None:
     assert (sun["truth_alpha_deg"], sun["truth_beta_deg"]) == pytest.approx((20, 10))
     assert (nadir["truth_alpha_deg"], nadir["truth_beta_deg"]) == pytest.approx((-8, 12))
     assert max(sun["error_deg"], nadir["error_deg"]) < 0.1
+
+
+def ball(run: Run, *options: str) -> list[dict[str, float]]:
+    code, out, err = run("ball", "--step", "30", "--samples", "2", "--json", *options)
+    assert (code, err) == (0, "")
+    return [json.loads(line) for line in out.splitlines()]
+
+
+def test_directions_and_profiles(run: Run) -> None:
+    published = ball(run, "--profile", "published")
+    mean = sum(line["offset_deg"] for line in published) / 4
+    assert 0.04 < mean < 0.4  # published: 0.12 to 0.16
+    assert [line["direction"] for line in published] == ["right", "left", "down", "up"]
+    assert all(line["detected"] == line["pictures"] == 4 for line in published)
+    # 10 mm before the axis: 0.88 deg more at 30 deg, none at 0.
+    off = ball(run, "--profile", "extended", "--off-axis", "10")
+    assert all(line["offset_deg"] == pytest.approx(0.44, abs=0.04) for line in off)
+    assert all(line["sigma_deg"] < 0.05 for line in off)
