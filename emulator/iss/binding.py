@@ -62,7 +62,7 @@ class FpgaWireRecord(ctypes.Structure):
 
 
 class RangeRecord(ctypes.Structure):
-    """``CodeRange`` of insight.h."""
+    """``CodeRange`` of insight.cpp."""
 
     _fields_ = (
         ("base", ctypes.c_uint32),
@@ -75,7 +75,7 @@ class RangeRecord(ctypes.Structure):
 
 
 class EdgeRecord(ctypes.Structure):
-    """``Edge`` of insight.h."""
+    """``Edge`` of insight.cpp."""
 
     _fields_ = (
         ("site", ctypes.c_uint32),
@@ -86,7 +86,7 @@ class EdgeRecord(ctypes.Structure):
 
 
 class ChangeRecord(ctypes.Structure):
-    """``Change`` of insight.h."""
+    """``Change`` of insight.cpp."""
 
     _fields_ = (
         ("time", ctypes.c_int64),
@@ -136,10 +136,10 @@ _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "insight_trace": (None, (_P, _I)),
     "insight_delete": (None, (_P, _P)),
     "insight_finish": (None, (_P,)),
-    "insight_edges": (_I, (_P, ctypes.POINTER(EdgeRecord), _I)),
+    "insight_edges": (_I, (_P, ctypes.POINTER(EdgeRecord))),
     "insight_changes": (_I, (_P, ctypes.POINTER(ChangeRecord))),
     "insight_figures": (None, (_P, ctypes.POINTER(_L))),
-    "insight_fault": (None, (_P, ctypes.POINTER(_L))),
+    "insight_fault": (None, (_P, _P)),
 }
 
 Library = Any

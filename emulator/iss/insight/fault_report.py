@@ -7,7 +7,6 @@ stack frame).
 import ctypes
 from collections.abc import Iterator, Mapping
 from types import MappingProxyType
-from typing import NamedTuple
 
 from cubestack.emulator.iss.binding import simulator
 from cubestack.emulator.iss.insight.backtrace import PSP, backtrace
@@ -55,20 +54,16 @@ BRANCH_TO_SELF = b"\xfe\xe7"
 REPORTED_FRAMES = 12
 
 
-class FaultRecord(NamedTuple):
-    """``FaultRecord`` of system.h."""
+class FaultRecord(ctypes.Structure):
+    """``FaultRecord`` of system.h: the last fault."""
 
-    exception: int
-    cfsr: int
-    hfsr: int
-    dfsr: int
-    mmfar: int
-    bfar: int
-    pc: int
-    frame: int
-    exc_return: int
-    count: int
-    cycle: int
+    _fields_ = (
+        *((name, ctypes.c_uint32) for name in (
+            "exception", "cfsr", "hfsr", "dfsr", "mmfar", "bfar", "pc", "frame", "exc_return",
+            "count",
+        )),
+        ("cycle", ctypes.c_int64),
+    )  # fmt: skip
 
 
 def exception_name(number: int, interrupts: Mapping[int, str] = MappingProxyType({})) -> str:
@@ -82,9 +77,9 @@ def exception_name(number: int, interrupts: Mapping[int, str] = MappingProxyType
 
 def last_fault(machine: Machine) -> FaultRecord:
     """The last fault; its ``count`` is 0 if there was none since power-on."""
-    values = (ctypes.c_int64 * len(FaultRecord._fields))()
-    simulator().insight_fault(machine.handle, values)
-    return FaultRecord(*values)
+    record = FaultRecord()
+    simulator().insight_fault(machine.handle, ctypes.byref(record))
+    return record
 
 
 def unhandled(machine: Machine) -> bool:

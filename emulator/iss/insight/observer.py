@@ -19,7 +19,7 @@ from cubestack.emulator.iss.machine import FLASH_BASE, RAM_BASE, Machine
 EXCEPTION_SITE = 0xFFFF_F000
 MOST_EDGES = 1 << 14
 MOST_CHANGES = 1 << 14
-"""As in insight.h."""
+"""As in insight.cpp."""
 
 FUNCTION, EXCEPTION, HANDLER = "function", "exception", "handler"
 """Variables of a history."""
@@ -137,7 +137,7 @@ class Observer:
             return self._found
         self._library.insight_finish(self._handle)
         records = (EdgeRecord * MOST_EDGES)()
-        found = self._library.insight_edges(self._handle, records, MOST_EDGES)
+        found = self._library.insight_edges(self._handle, records)
         return [
             Edge(
                 one.site - EXCEPTION_SITE if one.site >= EXCEPTION_SITE else one.site,

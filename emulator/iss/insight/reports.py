@@ -37,7 +37,7 @@ def write_callgrind(observer: Observer, stream: IO[str]) -> None:
     calls include the cycles of everything below them. The caller of exceptions is named
     "(exceptions)".
     """
-    symbols = observer.symbols
+    symbols, image = observer.symbols, observer.machine.image
     costs: dict[tuple[str, str], dict[tuple[str, int], int]] = defaultdict(lambda: defaultdict(int))
     places: dict[str, tuple[str, str]] = {}
 
@@ -69,7 +69,8 @@ def write_callgrind(observer: Observer, stream: IO[str]) -> None:
     files, functions = _Names(), _Names()
     stream.write(
         "# callgrind format\nversion: 1\ncreator: cubestack\n"
-        f"cmd: {_name(observer)}\npositions: line\nevents: Cycles\nsummary: {total}\n"
+        f"cmd: {image.path if image and image.path else 'firmware'}\n"
+        f"positions: line\nevents: Cycles\nsummary: {total}\n"
     )
     for where in sorted({*costs, *calls}):
         file, name = where
@@ -91,11 +92,6 @@ def write_callgrind(observer: Observer, stream: IO[str]) -> None:
                 f"{number} {edge.cycles}\n"
             )
     stream.write(f"\ntotals: {total}\n")
-
-
-def _name(observer: Observer) -> str:
-    image = observer.machine.image
-    return str(image.path) if image is not None and image.path is not None else "firmware"
 
 
 def write_lcov(observer: Observer, stream: IO[str]) -> None:

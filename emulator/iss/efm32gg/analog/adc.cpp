@@ -108,37 +108,34 @@ private:
     uint32_t warm_reference = ~0u;
     Event converted = Event::of<&Adc::on_converted>(this);
 
-    double volts(int input) const {
-        return part.memories.analog ? part.memories.analog[input] : 0;
-    }
-
     double reference(uint32_t control) const {
         switch (field(control, SINGLECTRL_REF)) {
         case V1_25: return 1.25;
         case V2_5: return 2.5;
-        case SUPPLY: return volts(analog::VDD);
+        case SUPPLY: return part.volts(analog::VDD);
         case V5_DIFF: return 5.0;
-        case EXTERNAL: return volts(analog::ADC0_REFERENCE);
-        case EXTERNAL_TWICE: return 2 * volts(analog::ADC0_REFERENCE);
-        default: return 2 * volts(analog::VDD);
+        case EXTERNAL: return part.volts(analog::ADC0_REFERENCE);
+        case EXTERNAL_TWICE: return 2 * part.volts(analog::ADC0_REFERENCE);
+        default: return 2 * part.volts(analog::VDD);
         }
     }
 
     double input_volts(uint32_t selected, bool difference, double reference) const {
+        const int pair = 2 * (int)selected;
         if (difference)
-            return selected < 4 ? volts((int)(2 * selected)) - volts((int)(2 * selected + 1)) : 0;
-        if (selected < TEMPERATURE) return volts(analog::ADC0_CH0 + (int)selected);
+            return selected < 4 ? part.volts(pair) - part.volts(pair + 1) : 0;
+        if (selected < TEMPERATURE) return part.volts(analog::ADC0_CH0 + (int)selected);
         switch (selected) {
         case TEMPERATURE: {
             uint32_t degrees = 0, reading = 0;
             part.peek(CALIBRATED_AT, 1, degrees);
             part.peek(CALIBRATED_READING, 2, reading);
             const double code =
-                (reading >> 4) + (volts(analog::TEMPERATURE) - degrees) * CODES_PER_DEGREE;
+                (reading >> 4) + (part.volts(analog::TEMPERATURE) - degrees) * CODES_PER_DEGREE;
             return (code + 0.5) * 1.25 / 4096;
         }
-        case VDD_THIRD: return volts(analog::VDD) / 3;
-        case VDD: return volts(analog::VDD);
+        case VDD_THIRD: return part.volts(analog::VDD) / 3;
+        case VDD: return part.volts(analog::VDD);
         case REFERENCE_HALF: return reference / 2;
         default: return 0;
         }

@@ -68,10 +68,6 @@ protected:
     virtual void drive_output(bool output) { (void)output; }
     virtual uint32_t inactive_output() const = 0;
 
-    double volts(int input) const {
-        return part.memories.analog ? part.memories.analog[input] : 0;
-    }
-
 private:
     Event warmed = Event::of<&Comparator::on_warmed>(this);
 
@@ -115,10 +111,10 @@ private:
         const int channels = instance.index ? analog::ACMP1_CH0 : analog::ACMP0_CH0;
         const uint32_t selected = reg(acmp::INPUTSEL);
         const uint32_t negative = field(selected, acmp::INPUTSEL_NEGSEL);
-        const double supply = volts(analog::VDD);
+        const double supply = part.volts(analog::VDD);
         double against = 0;
         if (negative < 8)
-            against = volts(channels + (int)negative);
+            against = part.volts(channels + (int)negative);
         else if (negative == 8)
             against = 1.25;
         else if (negative == 9)
@@ -126,7 +122,7 @@ private:
         else if (negative == 10)
             against = supply * field(selected, acmp::INPUTSEL_VDDLEVEL) / 63;
         const double step = HYSTERESIS[field(reg(CTRL), acmp::CTRL_HYSTSEL)];
-        return volts(channels + (int)field(selected, acmp::INPUTSEL_POSSEL)) >
+        return part.volts(channels + (int)field(selected, acmp::INPUTSEL_POSSEL)) >
                against + (before ? -step : step);
     }
 
@@ -152,7 +148,7 @@ private:
     bool above(bool before) const override {
         const double step = reg(CTRL) & vcmp::CTRL_HYSTEN ? SUPPLY_HYSTERESIS : 0;
         const double level = 1.667 + 0.034 * field(reg(vcmp::INPUTSEL), vcmp::INPUTSEL_TRIGLEVEL);
-        return volts(analog::VDD) > level + (before ? -step : step);
+        return part.volts(analog::VDD) > level + (before ? -step : step);
     }
 
     int reflex() const override { return 1; }

@@ -72,7 +72,8 @@ public:
     virtual void outputs_changed(int port, uint32_t changed, uint32_t levels, int64_t now) = 0;
 
     // Access to one byte of the external bus beyond the part's own arrays; false: no answer.
-    virtual bool bus_access(int bank, uint32_t address, uint8_t &value, bool write, int64_t now) = 0;
+    virtual bool bus_access(int bank, uint32_t address, uint8_t &value, bool write,
+                            int64_t now) = 0;
 };
 
 class Part : public armv7m::Bus, public armv7m::SystemListener {
@@ -152,6 +153,7 @@ public:
     // Reports each text once.
     void log_once(const char *format, ...) __attribute__((format(printf, 2, 3)));
     void analog_changed();
+    double volts(int input) const { return memories.analog ? memories.analog[input] : 0; }
     // `flags`: bit 0 framing error, bit 1 parity error; from bit 8 the line's bit rate, 0: unknown.
     void uart_receive(int unit, uint32_t data, uint32_t flags);
     // The I2C unit by number or by the pin of its SDA; null if none is routed there.
@@ -227,8 +229,8 @@ private:
 
 // Add units that no other unit accesses; each is defined beside its unit.
 void add_watchdog(Part &part);
-// `source`: of DMA requests; `reflex`: of PRS signals; `signals`: of the TX pin (route::Signal), the
-// RX pin's follows. The order of the calls is that of the unit numbers.
+// `source`: of DMA requests; `reflex`: of PRS signals; `signals`: of the TX pin (route::Signal),
+// the RX pin's follows. The order of the calls is that of the unit numbers.
 void add_usart(Part &part, const Instance &instance, int source, int reflex, int signals);
 void add_leuart(Part &part, const Instance &instance, int source, int signals);
 void add_low_energy_timers(Part &part);

@@ -7,64 +7,34 @@
 
 #include <stdint.h>
 
-#define __I volatile const
-#define __O volatile
 #define __IO volatile
 
 typedef struct {
-    __IO uint32_t CTRL, HFCORECLKDIV, HFPERCLKDIV, HFRCOCTRL, LFRCOCTRL, AUXHFRCOCTRL, CALCTRL, CALCNT;
-    __O uint32_t OSCENCMD, CMD;
-    __IO uint32_t LFCLKSEL;
-    __I uint32_t STATUS, IF;
-    __O uint32_t IFS, IFC;
-    __IO uint32_t IEN, HFCORECLKEN0, HFPERCLKEN0;
-    uint32_t RESERVED0[2];
-    __I uint32_t SYNCBUSY;
-    __IO uint32_t FREEZE, LFACLKEN0;
-    uint32_t RESERVED1[1];
-    __IO uint32_t LFBCLKEN0;
-    uint32_t RESERVED2[1];
-    __IO uint32_t LFAPRESC0;
-    uint32_t RESERVED3[1];
-    __IO uint32_t LFBPRESC0;
-    uint32_t RESERVED4[1];
-    __IO uint32_t PCNTCTRL, LCDCTRL, ROUTE, LOCK;
+    __IO uint32_t CTRL, HFCORECLKDIV, HFPERCLKDIV, HFRCOCTRL, LFRCOCTRL, AUXHFRCOCTRL, CALCTRL,
+        CALCNT, OSCENCMD, CMD, LFCLKSEL, STATUS, IF, IFS, IFC, IEN, HFCORECLKEN0, HFPERCLKEN0,
+        RESERVED0[2], SYNCBUSY, FREEZE, LFACLKEN0, RESERVED1, LFBCLKEN0, RESERVED2, LFAPRESC0,
+        RESERVED3, LFBPRESC0, RESERVED4, PCNTCTRL, LCDCTRL, ROUTE, LOCK;
 } CMU_TypeDef;
 
 typedef struct {
-    __IO uint32_t CTRL, MODEL, MODEH, DOUT;
-    __O uint32_t DOUTSET, DOUTCLR, DOUTTGL;
-    __I uint32_t DIN;
-    __IO uint32_t PINLOCKN;
+    __IO uint32_t CTRL, MODEL, MODEH, DOUT, DOUTSET, DOUTCLR, DOUTTGL, DIN, PINLOCKN;
 } GPIO_P_TypeDef;
 
 typedef struct {
     GPIO_P_TypeDef P[6];
-    uint32_t RESERVED0[10];
-    __IO uint32_t EXTIPSELL, EXTIPSELH, EXTIRISE, EXTIFALL, IEN;
-    __I uint32_t IF;
-    __O uint32_t IFS, IFC;
-    __IO uint32_t ROUTE, INSENSE, LOCK;
+    __IO uint32_t RESERVED0[10], EXTIPSELL, EXTIPSELH, EXTIRISE, EXTIFALL, IEN, IF, IFS, IFC, ROUTE,
+        INSENSE, LOCK;
 } GPIO_TypeDef;
 
 typedef struct {
-    __IO uint32_t CTRL, FRAME, TRIGCTRL, CMD;
-    __I uint32_t STATUS;
-    __IO uint32_t CLKDIV;
-    __I uint32_t RXDATAX, RXDATA, RXDOUBLEX, RXDOUBLE, RXDATAXP, RXDOUBLEXP;
-    __IO uint32_t TXDATAX, TXDATA, TXDOUBLEX, TXDOUBLE;
-    __I uint32_t IF;
-    __IO uint32_t IFS, IFC, IEN, IRCTRL, ROUTE, INPUT, I2SCTRL;
+    __IO uint32_t CTRL, FRAME, TRIGCTRL, CMD, STATUS, CLKDIV, RXDATAX, RXDATA, RXDOUBLEX, RXDOUBLE,
+        RXDATAXP, RXDOUBLEXP, TXDATAX, TXDATA, TXDOUBLEX, TXDOUBLE, IF, IFS, IFC, IEN, IRCTRL,
+        ROUTE, INPUT, I2SCTRL;
 } USART_TypeDef;
 
 typedef struct {
-    __IO uint32_t CTRL, CMD;
-    __I uint32_t STATE, STATUS;
-    __IO uint32_t CLKDIV, SADDR, SADDRMASK;
-    __I uint32_t RXDATA, RXDATAP;
-    __IO uint32_t TXDATA;
-    __I uint32_t IF;
-    __IO uint32_t IFS, IFC, IEN, ROUTE;
+    __IO uint32_t CTRL, CMD, STATE, STATUS, CLKDIV, SADDR, SADDRMASK, RXDATA, RXDATAP, TXDATA, IF,
+        IFS, IFC, IEN, ROUTE;
 } I2C_TypeDef;
 
 typedef struct {
@@ -72,88 +42,43 @@ typedef struct {
 } DMA_CH_TypeDef;
 
 typedef struct {
-    __I uint32_t STATUS;
-    __O uint32_t CONFIG;
-    __IO uint32_t CTRLBASE;
-    __I uint32_t ALTCTRLBASE, CHWAITSTATUS;
-    __O uint32_t CHSWREQ;
-    __IO uint32_t CHUSEBURSTS;
-    __O uint32_t CHUSEBURSTC;
-    __IO uint32_t CHREQMASKS;
-    __O uint32_t CHREQMASKC;
-    __IO uint32_t CHENS;
-    __O uint32_t CHENC;
-    __IO uint32_t CHALTS;
-    __O uint32_t CHALTC;
-    __IO uint32_t CHPRIS;
-    __O uint32_t CHPRIC;
-    uint32_t RESERVED0[3];
-    __IO uint32_t ERRORC;
-    uint32_t RESERVED1[880];
-    __I uint32_t CHREQSTATUS;
-    uint32_t RESERVED2[1];
-    __I uint32_t CHSREQSTATUS;
-    uint32_t RESERVED3[121];
-    __I uint32_t IF;
-    __IO uint32_t IFS, IFC, IEN, CTRL, RDS;
-    uint32_t RESERVED4[2];
-    __IO uint32_t LOOP0, LOOP1;
-    uint32_t RESERVED5[14];
-    __IO uint32_t RECT0;
-    uint32_t RESERVED6[39];
+    __IO uint32_t STATUS, CONFIG, CTRLBASE, ALTCTRLBASE, CHWAITSTATUS, CHSWREQ, CHUSEBURSTS,
+        CHUSEBURSTC, CHREQMASKS, CHREQMASKC, CHENS, CHENC, CHALTS, CHALTC, CHPRIS, CHPRIC,
+        RESERVED0[3], ERRORC, RESERVED1[880], CHREQSTATUS, RESERVED2, CHSREQSTATUS, RESERVED3[121],
+        IF, IFS, IFC, IEN, CTRL, RDS, RESERVED4[2], LOOP0, LOOP1, RESERVED5[14], RECT0,
+        RESERVED6[39];
     DMA_CH_TypeDef CH[12];
 } DMA_TypeDef;
 
 typedef struct {
-    __IO uint32_t CTRL, CNT, COMP0, COMP1;
-    __I uint32_t IF;
-    __IO uint32_t IFS, IFC, IEN, FREEZE;
-    __I uint32_t SYNCBUSY;
+    __IO uint32_t CTRL, CNT, COMP0, COMP1, IF, IFS, IFC, IEN, FREEZE, SYNCBUSY;
 } RTC_TypeDef;
 
 typedef struct {
-    __IO uint32_t CTRL, CMD;
-    __I uint32_t STATUS, CNT;
-    __IO uint32_t COMP0, COMP1, REP0, REP1;
-    __I uint32_t IF;
-    __IO uint32_t IFS, IFC, IEN, FREEZE;
-    __I uint32_t SYNCBUSY;
-    uint32_t RESERVED0[2];
-    __IO uint32_t ROUTE;
+    __IO uint32_t CTRL, CMD, STATUS, CNT, COMP0, COMP1, REP0, REP1, IF, IFS, IFC, IEN, FREEZE,
+        SYNCBUSY, RESERVED0[2], ROUTE;
 } LETIMER_TypeDef;
 
 typedef struct {
-    __IO uint32_t CTRL, READCTRL, WRITECTRL, WRITECMD, ADDRB;
-    uint32_t RESERVED0[1];
-    __IO uint32_t WDATA;
-    __I uint32_t STATUS;
-    uint32_t RESERVED1[3];
-    __I uint32_t IF;
-    __IO uint32_t IFS, IFC, IEN, LOCK, CMD;
-    __I uint32_t CACHEHITS, CACHEMISSES;
-    uint32_t RESERVED2[1];
-    __IO uint32_t TIMEBASE, MASSLOCK;
+    __IO uint32_t CTRL, READCTRL, WRITECTRL, WRITECMD, ADDRB, RESERVED0, WDATA, STATUS,
+        RESERVED1[3], IF, IFS, IFC, IEN, LOCK, CMD, CACHEHITS, CACHEMISSES, RESERVED2, TIMEBASE,
+        MASSLOCK;
 } MSC_TypeDef;
 
 typedef struct {
-    __IO uint32_t CTRL, CMD;
-    __I uint32_t SYNCBUSY;
+    __IO uint32_t CTRL, CMD, SYNCBUSY;
 } WDOG_TypeDef;
 
 typedef struct {
-    __IO uint32_t CTRL;
-    __I uint32_t RSTCAUSE;
-    __O uint32_t CMD;
+    __IO uint32_t CTRL, RSTCAUSE, CMD;
 } RMU_TypeDef;
 
 typedef struct {
-    __IO uint32_t CTRL, LOAD, VAL;
-    __I uint32_t CALIB;
+    __IO uint32_t CTRL, LOAD, VAL, CALIB;
 } SysTick_Type;
 
 typedef struct {
-    __I uint32_t CPUID;
-    __IO uint32_t ICSR, VTOR, AIRCR, SCR, CCR;
+    __IO uint32_t CPUID, ICSR, VTOR, AIRCR, SCR, CCR;
     __IO uint8_t SHP[12];
     __IO uint32_t SHCSR, CFSR, HFSR, DFSR, MMFAR, BFAR, AFSR;
 } SCB_Type;

@@ -1,17 +1,17 @@
 // Profile of a program: counts, calls, changes of function and stack use. It observes instructions
-// and changes nothing.
+// and changes nothing. The C functions at the end are called by observer.py and fault_report.py.
 //
 // Calls are recognised by their instructions (BL, BLX), tail calls by a branch from one function
 // into another, returns by address and stack pointer. An exception has no caller: its cycles do not
 // count for the code that it interrupts. When an exception returns to another stack than it came
 // from, the open calls of the old task are kept until it continues.
-#pragma once
+#include "api.h"
 
 #include "armv7m/core/cpu.h"
+#include "armv7m/system/system.h"
 
 #include <algorithm>
 #include <cstdint>
-#include <memory>
 
 namespace insight {
 
@@ -45,12 +45,7 @@ public:
     // Longer gaps between two instructions, in cycles, are sleep.
     static constexpr int64_t LONGEST_WAIT = 64;
 
-    using Now = int64_t (*)(void *owner);
-
-    Insight(Now now, void *owner) : now(now), owner(owner) {}
-
-    void set_range(int index, const CodeRange &range) { ranges[index] = range; }
-    void trace_changes(bool on) { tracing = on; }
+    explicit Insight(IssMachine *machine) : machine(machine) {}
 
     void instruction(uint32_t pc, uint32_t next, int64_t before, int64_t after,
                      armv7m::Cpu &cpu) override {
@@ -79,8 +74,9 @@ public:
         if (returning)
             leave_exception(last);
         last = wait_or_sleep(cpu.cycles);
-        push({returns_to, from_process(cpu) ? cpu.process_sp() : 0,
-              EXCEPTION_SITE + (uint32_t)number, cpu.r[15], last, stolen, true});
+        const bool from_process = (cpu.r[14] & 0xC) == 0xC;  // LR is EXC_RETURN
+        push({returns_to, from_process ? cpu.process_sp() : 0, EXCEPTION_SITE + (uint32_t)number,
+              cpu.r[15], last, stolen, true});
         if (tracing)
             record(cpu.r[15], cpu);
     }
@@ -96,6 +92,8 @@ public:
             close(last);
     }
 
+    CodeRange ranges[2] = {};
+    bool tracing = false;  // whether changes are recorded
     Edge edges[EDGES] = {};
     uint32_t edge_count = 0;
     uint64_t edges_lost = 0;
@@ -117,8 +115,8 @@ private:
         Frame frames[TASK_DEPTH];
     };
 
-    // The first cycle that counts for an instruction or exception at `cycles`: waits since the previous
-    // one count, sleep does not.
+    // The first cycle that counts for an instruction or exception at `cycles`: waits since the
+    // previous one count, sleep does not.
     int64_t wait_or_sleep(int64_t cycles) {
         const int64_t gap = cycles - last;
         if (gap <= LONGEST_WAIT) return last;
@@ -148,9 +146,6 @@ private:
             switch_task(stack, resumed, cycles);
     }
 
-    // At an exception's entry LR is EXC_RETURN.
-    static bool from_process(const armv7m::Cpu &cpu) { return (cpu.r[14] & 0xC) == 0xC; }
-
     const CodeRange *range_of(uint32_t pc) const {
         for (const CodeRange &range : ranges)
             if (pc - range.base < range.size) return &range;
@@ -166,7 +161,7 @@ private:
         const uint32_t sp = cpu.r[13];
         const uint32_t length = call_length(range, pc);
         if (length) {
-            open(pc + length, sp, pc, next, cpu.cycles);
+            push({pc + length, sp, pc, next, cpu.cycles, stolen, false});
             return;
         }
         // Frames above the stack pointer were left, for example by longjmp.
@@ -181,7 +176,8 @@ private:
         if (returned || !depth || frames[depth - 1].exception) return;
         const uint16_t from = function_at(pc), to = function_at(next);
         if (from != to && from && to)
-            open(frames[depth - 1].returns_to, frames[depth - 1].sp, pc, next, cpu.cycles);
+            push({frames[depth - 1].returns_to, frames[depth - 1].sp, pc, next, cpu.cycles, stolen,
+                  false});
     }
 
     // Length in bytes of the call at `pc`; 0: no call. ARMv7-M, A7.7.18 and A7.7.19.
@@ -192,10 +188,6 @@ private:
         const uint32_t second = code[2] | (uint32_t)code[3] << 8;
         if ((first & 0xFF87) == 0x4780) return 2;
         return (first & 0xF800) == 0xF000 && (second & 0xD000) == 0xD000 ? 4 : 0;
-    }
-
-    void open(uint32_t returns_to, uint32_t sp, uint32_t site, uint32_t callee, int64_t cycles) {
-        push({returns_to, sp, site, callee, cycles, stolen, false});
     }
 
     // An endless recursion drops its oldest calls.
@@ -255,24 +247,74 @@ private:
         const uint16_t function = function_at(pc);
         if (function == recorded && cpu.ipsr == recorded_exception) return;
         recorded = function, recorded_exception = cpu.ipsr;
-        changes[change_count++] = {now(owner), function, cpu.ipsr, pc};
+        changes[change_count++] = {iss_now(machine), function, cpu.ipsr, pc};
         if (change_count + 2 >= CHANGES)
             cpu.stop();
         if (change_count == CHANGES)
             change_count--;
     }
 
-    Now now;
-    void *owner;
-    CodeRange ranges[2] = {};
+    IssMachine *const machine;
     Frame frames[DEPTH];
     Task tasks[TASKS];
     int depth = 0;
     int64_t last = 0, stolen = 0;
-    bool returning = false, tracing = false;
+    bool returning = false;
     uint32_t last_pc = 0;
     uint32_t resumed = 0;  // process stack pointer to which an exception returns; 0: main stack
     uint16_t recorded = 0xFFFF, recorded_exception = 0xFFFF;
 };
 
 }  // namespace insight
+
+using insight::Insight;
+
+extern "C" {
+
+// Starts to observe a machine; `count`: number of code ranges, at most 2.
+Insight *insight_new(IssMachine *machine, const insight::CodeRange *ranges, int32_t count) {
+    auto *observer = new Insight(machine);
+    std::copy(ranges, ranges + count, observer->ranges);
+    iss_cpu(machine)->set_tracer(observer);
+    return observer;
+}
+
+// Ends the observation. `machine` is null if it no longer exists.
+void insight_delete(IssMachine *machine, Insight *observer) {
+    if (machine && iss_cpu(machine)->tracer == observer)
+        iss_cpu(machine)->set_tracer(nullptr);
+    delete observer;
+}
+
+// Whether changes are recorded.
+void insight_trace(Insight *observer, int32_t on) { observer->tracing = on; }
+
+// Closes open calls.
+void insight_finish(Insight *observer) { observer->finish(); }
+
+// Copies the edges to `out`, which must have room for EDGES; returns their number.
+int32_t insight_edges(const Insight *observer, insight::Edge *out) {
+    const auto used = [](const insight::Edge &edge) { return edge.count != 0; };
+    const auto &all = observer->edges;
+    return (int32_t)(std::copy_if(std::begin(all), std::end(all), out, used) - out);
+}
+
+// Moves all changes to `out`, which must have room for CHANGES; returns their number.
+int32_t insight_changes(Insight *observer, insight::Change *out) {
+    const int32_t count = (int32_t)observer->change_count;
+    std::copy(observer->changes, observer->changes + count, out);
+    observer->change_count = 0;
+    return count;
+}
+
+// Lowest stack pointers (main, process), cycles asleep, number of edges lost.
+void insight_figures(const Insight *observer, int64_t *out) {
+    out[0] = observer->lowest_sp[0], out[1] = observer->lowest_sp[1];
+    out[2] = observer->idle, out[3] = (int64_t)observer->edges_lost;
+}
+
+void insight_fault(IssMachine *machine, armv7m::FaultRecord *out) {
+    *out = iss_system(machine)->last_fault();
+}
+
+}  // extern "C"
