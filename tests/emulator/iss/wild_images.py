@@ -6,6 +6,8 @@ from collections.abc import Callable
 
 from cubestack.firmware_model.interface.efm32gg import LAYOUTS
 
+from .armv7m.thumb import constant
+
 STACK = 0x2000_8000
 START = 0x400
 INTERESTING = (
@@ -49,11 +51,7 @@ def address(chance: random.Random) -> int:
 
 
 def _constant(register: int, value: int) -> bytes:
-    halves = []
-    for opcode, part in ((0xF240, value & 0xFFFF), (0xF2C0, value >> 16)):
-        halves.append(opcode | (part >> 11 & 1) << 10 | part >> 12)
-        halves.append((part >> 8 & 7) << 12 | register << 8 | part & 0xFF)
-    return struct.pack("<4H", *halves)
+    return struct.pack("<4H", *constant(register, value))
 
 
 def noise(chance: random.Random) -> bytes:
@@ -146,19 +144,6 @@ def one_peripheral(chance: random.Random) -> bytes:
     return _program(chance, code)
 
 
-KINDS: dict[str, Callable[[random.Random], bytes]] = {
-    each.__name__: each
-    for each in (
-        noise,
-        noise_that_starts,
-        short_instructions,
-        accesses,
-        accesses_with_clocks,
-        one_peripheral,
-    )
-}
-
-
-def make(kind: str, chance: random.Random) -> bytes:
-    """An image of that kind."""
-    return KINDS[kind](chance)
+_MAKERS = (noise, noise_that_starts, short_instructions, accesses, accesses_with_clocks,
+           one_peripheral)  # fmt: skip
+KINDS: dict[str, Callable[[random.Random], bytes]] = {each.__name__: each for each in _MAKERS}

@@ -3,9 +3,9 @@
 import ctypes
 from functools import lru_cache, partial
 from pathlib import Path
-from typing import NamedTuple
 
 from cubestack.emulator.iss.binding import FOLDER, LOOP
+from cubestack.emulator.iss.insight.fault_report import FaultRecord
 from cubestack.emulator.native import cache
 from cubestack.emulator.native.compiler import Compiler, compile_library
 
@@ -43,31 +43,28 @@ STOP, SLEEP, LOCKUP = 2, 4, 8
 """Bits of the result of a run."""
 
 
-class Entry(NamedTuple):
+class Entry(ctypes.Structure):
     """A value that the program wrote to the log."""
 
-    cycle: int
-    value: int
-    exception: int
+    _fields_ = (
+        ("cycle", ctypes.c_int64),
+        ("value", ctypes.c_uint32),
+        ("exception", ctypes.c_uint32),
+    )
 
 
-class Fault(NamedTuple):
-    """The system's record of the last fault."""
-
-    exception: int
-    cfsr: int
-    hfsr: int
-    dfsr: int
-    mmfar: int
-    bfar: int
-    pc: int
-    frame: int
-    exc_return: int
-    count: int
-
-
-class _LogEntry(ctypes.Structure):
-    _fields_ = (("cycle", ctypes.c_int64), ("value", ctypes.c_uint32), ("ipsr", ctypes.c_uint32))
+_P, _I, _U, _L = ctypes.c_void_p, ctypes.c_int32, ctypes.c_uint32, ctypes.c_int64
+_FUNCTIONS = {
+    "new": (_P, (_I, _I, _I, _L, _L)), "delete": (None, (_P,)), "reset": (None, (_P, _I)),
+    "code": (_P, (_P,)), "ram": (_P, (_P,)), "run": (_U, (_P, _L)), "at": (None, (_P, _L, _I, _I)),
+    "get": (_U, (_P, _I)), "set": (None, (_P, _I, _U)), "cycles": (_L, (_P,)),
+    "set_cycles": (None, (_P, _L)), "next_cycle": (_L, (_P,)), "service": (None, (_P,)),
+    "return": (None, (_P, _U)), "line": (None, (_P, _I, _I)), "debugger": (None, (_P, _I, _U)),
+    "read": (_I, (_P, _U, _I, ctypes.POINTER(_U))), "write": (_I, (_P, _U, _I, _U)),
+    "peek": (_U, (_P, _U)), "log": (_I, (_P, _P, _I)), "text": (_I, (_P, _P, _I)),
+    "fault": (None, (_P, _P)),
+}  # fmt: skip
+"""Result and argument types of system_bench.cpp."""
 
 
 @lru_cache(maxsize=1)
@@ -83,11 +80,9 @@ def _library() -> ctypes.CDLL:
 
     recipe = cache.recipe("the core's bench", "bench", files, partial(build, [*core, here]))
     library = ctypes.CDLL(str(cache.library_of(recipe)))
-    library.bench_new.restype = ctypes.c_void_p
-    library.bench_code.restype = library.bench_ram.restype = ctypes.c_void_p
-    library.bench_get.restype = library.bench_peek.restype = ctypes.c_uint32
-    library.bench_run.restype = ctypes.c_uint32
-    library.bench_cycles.restype = library.bench_next_cycle.restype = ctypes.c_int64
+    for name, (result, arguments) in _FUNCTIONS.items():
+        function = getattr(library, f"bench_{name}")
+        function.restype, function.argtypes = result, arguments
     return library
 
 
@@ -106,11 +101,7 @@ class Bench:
         reference: tuple[int, int] = (0, 1),
     ) -> None:
         self._library = _library()
-        self._bench = ctypes.c_void_p(
-            self._library.bench_new(
-                interrupts, priority_bits, semihosting, *map(ctypes.c_int64, reference)
-            )
-        )
+        self._bench = self._library.bench_new(interrupts, priority_bits, semihosting, *reference)
         memory = ctypes.c_uint8 * (1 << 16)
         self.code = memory.from_address(self._library.bench_code(self._bench))
         self.ram = memory.from_address(self._library.bench_ram(self._bench))
@@ -135,7 +126,7 @@ class Bench:
         if name in SYSTEM:
             assert self.write(SYSTEM[name], value)
         else:
-            self._library.bench_set(self._bench, REGISTERS[name], ctypes.c_uint32(value))
+            self._library.bench_set(self._bench, REGISTERS[name], value)
 
     @property
     def ipsr(self) -> int:
@@ -148,14 +139,13 @@ class Bench:
 
     @cycles.setter
     def cycles(self, value: int) -> None:
-        self._library.bench_set_cycles(self._bench, ctypes.c_int64(value))
+        self._library.bench_set_cycles(self._bench, value)
 
     @property
     def log(self) -> list[Entry]:
         """Values written to ``LOG``."""
-        entries = (_LogEntry * 4096)()
-        count = self._library.bench_log(self._bench, entries, 4096)
-        return [Entry(each.cycle, each.value, each.ipsr) for each in entries[:count]]
+        entries = (Entry * 4096)()
+        return entries[: self._library.bench_log(self._bench, entries, 4096)]
 
     @property
     def text(self) -> str:
@@ -165,10 +155,10 @@ class Bench:
         return buffer.raw[:length].decode()
 
     @property
-    def fault(self) -> Fault:
-        words = (ctypes.c_uint32 * 10)()
-        self._library.bench_fault(self._bench, words)
-        return Fault(*words)
+    def fault(self) -> FaultRecord:
+        record = FaultRecord()
+        self._library.bench_fault(self._bench, ctypes.byref(record))
+        return record
 
     def reset(self, power_on: bool = True) -> None:
         """Start from the vector table; also discards decoded code."""
@@ -176,11 +166,11 @@ class Bench:
 
     def run(self, cycles: int) -> int:
         """Run for a number of cycles or until a stop; returns the reasons as bits."""
-        return self._library.bench_run(self._bench, ctypes.c_int64(self.cycles + cycles))
+        return self._library.bench_run(self._bench, self.cycles + cycles)
 
     def at(self, cycle: int, kind: int, number: int = 0) -> None:
         """Schedule an event."""
-        self._library.bench_at(self._bench, ctypes.c_int64(cycle), kind, number)
+        self._library.bench_at(self._bench, cycle, kind, number)
 
     def line(self, number: int, level: bool) -> None:
         self._library.bench_line(self._bench, number, level)
@@ -191,11 +181,11 @@ class Bench:
 
     def exception_return(self, value: int) -> None:
         """Branch to an EXC_RETURN value."""
-        self._library.bench_return(self._bench, ctypes.c_uint32(value))
+        self._library.bench_return(self._bench, value)
 
     def debugger(self, catches: int) -> None:
         """Attach a halting debugger."""
-        self._library.bench_debugger(self._bench, 1, ctypes.c_uint32(catches))
+        self._library.bench_debugger(self._bench, 1, catches)
 
     @property
     def next_cycle(self) -> int:
@@ -205,22 +195,16 @@ class Bench:
     def read(self, address: int, size: int = 4) -> int | None:
         """Read the private peripheral bus; None is a bus error."""
         value = ctypes.c_uint32()
-        done = self._library.bench_read(
-            self._bench, ctypes.c_uint32(address), size, ctypes.byref(value)
-        )
+        done = self._library.bench_read(self._bench, address, size, value)
         return value.value if done else None
 
     def write(self, address: int, value: int, size: int = 4) -> bool:
         """Write the private peripheral bus; False is a bus error."""
-        return bool(
-            self._library.bench_write(
-                self._bench, ctypes.c_uint32(address), size, ctypes.c_uint32(value)
-            )
-        )
+        return bool(self._library.bench_write(self._bench, address, size, value))
 
     def peek(self, address: int) -> int:
         """Read as a debugger does."""
-        return self._library.bench_peek(self._bench, ctypes.c_uint32(address))
+        return self._library.bench_peek(self._bench, address)
 
     def word(self, address: int) -> int:
         """Read a word of RAM."""

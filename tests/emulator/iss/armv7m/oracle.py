@@ -1,5 +1,7 @@
 """A machine without peripherals and unicorn's Cortex-M3, which run the same slices."""
 
+from collections.abc import Mapping
+
 import unicorn
 from unicorn import arm_const
 
@@ -14,7 +16,6 @@ _NAMES = (*(f"r{n}" for n in range(13)), "sp", "lr", "pc", "xpsr", "psp", "msp",
 _IDS = (*(getattr(_U, f"UC_ARM_REG_R{n}") for n in range(13)), _U.UC_ARM_REG_SP, _U.UC_ARM_REG_LR,
         _U.UC_ARM_REG_PC, _U.UC_ARM_REG_XPSR, _U.UC_ARM_REG_PSP, _U.UC_ARM_REG_MSP,
         _U.UC_ARM_REG_PRIMASK, _U.UC_ARM_REG_FAULTMASK, _U.UC_ARM_REG_CONTROL)  # fmt: skip
-_CODE_FROM, _CODE_BYTES = 0, 0x10000
 _FOREVER = 1 << 60
 
 
@@ -22,23 +23,26 @@ class UnequalError(AssertionError):
     """The results differ."""
 
 
+def cortex_m3(memories: Mapping[int, bytes]) -> unicorn.Uc:
+    """Unicorn's Cortex-M3 with these memories by address."""
+    oracle = unicorn.Uc(unicorn.UC_ARCH_ARM, unicorn.UC_MODE_THUMB | unicorn.UC_MODE_MCLASS)
+    oracle.ctl_set_cpu_model(_U.UC_CPU_ARM_CORTEX_M3)
+    for address, content in memories.items():
+        oracle.mem_map(address, len(content))
+        oracle.mem_write(address, content)
+    return oracle
+
+
 class Pair:
     """Both processors, with equal memories."""
 
     def __init__(self, flash: bytes, ram: bytes) -> None:
-        self.machine = Machine(bare_hz=1_000_000, flash_bytes=_CODE_BYTES, ram_bytes=RAM_BYTES)
+        self.machine = Machine(bare_hz=1_000_000, flash_bytes=0x10000, ram_bytes=RAM_BYTES)
         self.machine.flash[:] = 0xFF
         self.machine.flash[: len(flash)] = list(flash)
         self.machine.ram[:] = list(ram)
         self.machine.reset()
-        self.oracle = unicorn.Uc(
-            unicorn.UC_ARCH_ARM, unicorn.UC_MODE_THUMB | unicorn.UC_MODE_MCLASS
-        )
-        self.oracle.ctl_set_cpu_model(_U.UC_CPU_ARM_CORTEX_M3)
-        self.oracle.mem_map(_CODE_FROM, _CODE_BYTES)
-        self.oracle.mem_map(RAM, RAM_BYTES)
-        self.oracle.mem_write(0, bytes(self.machine.flash))
-        self.oracle.mem_write(RAM, ram)
+        self.oracle = cortex_m3({0: bytes(self.machine.flash), RAM: ram})
         self.machine.breakpoints.add(END)
 
     def prepare(self, slice_: Slice) -> None:

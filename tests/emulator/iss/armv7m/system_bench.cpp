@@ -203,9 +203,6 @@ int32_t bench_text(Bench *bench, char *buffer, int32_t most) {
     return length;
 }
 
-void bench_fault(Bench *bench, uint32_t *words) {
-    const FaultRecord &record = bench->system.last_fault();
-    std::memcpy(words, &record, 10 * sizeof(uint32_t));
-}
+void bench_fault(Bench *bench, FaultRecord *record) { *record = bench->system.last_fault(); }
 
 }  // extern "C"

@@ -10,13 +10,17 @@ from pathlib import Path
 import pytest
 
 from cubestack.emulator.iss.image import load_image
+from cubestack.emulator.iss.insight.symbols import Symbols
 from cubestack.emulator.iss.machine import RAM_BYTES, Machine
 from cubestack.emulator.iss.outcome import StopReason
 from cubestack.emulator.native.compiler import find_compiler
 from tests.emulator.iss.cross_compiler import compile_for_m3, needs_compiler
 
-unicorn = pytest.importorskip("unicorn", reason="unicorn is not installed")
-elffile = pytest.importorskip("elftools.elf.elffile")
+pytest.importorskip("unicorn", reason="unicorn is not installed")
+
+from unicorn import arm_const
+
+from .oracle import cortex_m3
 
 SOURCES = Path(__file__).parent / "compiled"
 PROGRAMS = sorted(path.stem for path in SOURCES.glob("*.c") if path.stem != "support")
@@ -53,14 +57,15 @@ def test_program_ends_as_on_unicorn(
     elf = tmp_path / f"{name}.elf"
     _compile(optimization, SOURCES / f"{name}.c", support, f"-T{SOURCES / 'link.ld'}",
              "-nostartfiles", "-Wl,--no-warn-rwx-segments", "-lm", "-o", elf)  # fmt: skip
-    with elf.open("rb") as file:
-        table = elffile.ELFFile(file).get_section_by_name(".symtab")
-        symbols = {one.name: one["st_value"] for one in table.iter_symbols()}
-    finished = symbols["finished"] & ~1
-
+    symbols = Symbols(elf.read_bytes()).labels
+    finished = symbols["finished"]
     machine = Machine(bare_hz=1_000_000)
     machine.load(load_image(elf))
-    oracle = _oracle(machine, finished)
+    oracle = cortex_m3({0: machine.flash.tobytes(), RAM: bytes(RAM_BYTES)})
+    stack, start = machine.flash[:8].view("<u4")
+    oracle.reg_write(arm_const.UC_ARM_REG_SP, int(stack))
+    oracle.reg_write(arm_const.UC_ARM_REG_LR, 0xFFFF_FFFF)
+    oracle.emu_start(int(start) | 1, finished)
     machine.reset()
     machine.breakpoints.add(finished)
     stop = machine.run(_LONG)
@@ -68,24 +73,11 @@ def test_program_ends_as_on_unicorn(
 
     ours = machine.ram.tobytes()
     theirs = bytes(oracle.mem_read(RAM, RAM_BYTES))
-    start, length = symbols["output"] - RAM, symbols["output_length"] - RAM
-    printed = ours[start : start + int.from_bytes(ours[length : length + 4], "little")]
-    assert printed == theirs[start : start + len(printed)]
+    begin, length = symbols["output"] - RAM, symbols["output_length"] - RAM
+    printed = ours[begin : begin + int.from_bytes(ours[length : length + 4], "little")]
+    assert printed == theirs[begin : begin + len(printed)]
     assert printed.decode().splitlines()[-1].split()[0] == name
     assert ours == theirs
     for number in range(13):
-        register = oracle.reg_read(unicorn.arm_const.UC_ARM_REG_R0 + number)
+        register = oracle.reg_read(arm_const.UC_ARM_REG_R0 + number)
         assert machine.register(f"r{number}") == register
-
-
-def _oracle(machine: Machine, finished: int) -> "unicorn.Uc":
-    oracle = unicorn.Uc(unicorn.UC_ARCH_ARM, unicorn.UC_MODE_THUMB | unicorn.UC_MODE_MCLASS)
-    oracle.ctl_set_cpu_model(unicorn.arm_const.UC_CPU_ARM_CORTEX_M3)
-    oracle.mem_map(0, machine.flash.size)
-    oracle.mem_map(RAM, RAM_BYTES)
-    oracle.mem_write(0, machine.flash.tobytes())
-    stack, start = machine.flash[:8].view("<u4")
-    oracle.reg_write(unicorn.arm_const.UC_ARM_REG_SP, int(stack))
-    oracle.reg_write(unicorn.arm_const.UC_ARM_REG_LR, 0xFFFF_FFFF)
-    oracle.emu_start(int(start) | 1, finished)
-    return oracle

@@ -87,8 +87,9 @@ def test_fault(name, enabled):
     assert bench.word(TOP - 32 + 24) == (bench.labels["here"] if at is None else at)
     if address is not None:
         assert bench["BFAR"] == address
-    assert bench.fault[:3] == (bench.ipsr, cfsr, bench["HFSR"])
-    assert bench.fault.frame == TOP - 32
+    fault = bench.fault
+    assert (fault.exception, fault.cfsr, fault.hfsr) == (bench.ipsr, cfsr, bench["HFSR"])
+    assert fault.frame == TOP - 32
     active = {4: 0, 5: 1, 6: 3}[exception]
     assert bench["SHCSR"] & 0xFFFF == (1 << active if enabled else 0)
     bench["CFSR"] = cfsr & 0xFFFF_FFFE

@@ -22,7 +22,8 @@ _OPERAND = re.compile(rf"\b({'|'.join(_NUMBERS)})\b|[#=]\w+")
 _CONDITIONS = {"b": 14, "beq": 0, "bne": 1}
 
 
-def _constant(register: int, value: int) -> list[int]:
+def constant(register: int, value: int) -> list[int]:
+    """MOVW and MOVT of a register."""
     halves = []
     for opcode, part in ((0xF240, value & 0xFFFF), (0xF2C0, value >> 16)):
         halves.append(opcode | (part >> 11 & 1) << 10 | part >> 12)
@@ -40,7 +41,7 @@ _FORMS = {
     "cpsid i": lambda: [0xB672],
     "cpsie i": lambda: [0xB662],
     "isb": lambda: [0xF3BF, 0x8F6F],
-    "ldr R, =": _constant,
+    "ldr R, =": constant,
     "ldr R, [R]": lambda t, n: [0x6800 | n << 3 | t],
     "ldr R, [sp, #]": lambda t, offset: [0x9800 | t << 8 | offset >> 2],
     "movs R, #": lambda d, value: [0x2000 | d << 8 | value],
