@@ -4,6 +4,7 @@ import argparse
 from collections import defaultdict
 from collections.abc import Callable
 from importlib.metadata import metadata
+from pathlib import Path
 from typing import Any, NoReturn, TypeVar
 
 from cubestack.firmware_model.values import FLAG, Declaration, ListDeclaration
@@ -61,6 +62,16 @@ def add_value(parser: argparse._ActionsContainer, name: str, one: Any, **how: An
         if repeated:
             how |= {"action": "append", "default": []}
     parser.add_argument(option_string(name), **how)
+
+
+def add_flag(parser: argparse._ActionsContainer, name: str, meaning: str) -> None:
+    parser.add_argument(name, action="store_true", help=meaning)
+
+
+def add_path(
+    parser: argparse._ActionsContainer, name: str, meaning: str, metavar: str = "FILE"
+) -> None:
+    parser.add_argument(name, type=Path, metavar=metavar, help=meaning)
 
 
 def _read(one: Declaration) -> Callable[[str], Any]:

@@ -16,6 +16,7 @@ import json
 import sys
 from collections import Counter
 
+from cubestack.host.cli.arguments import add_flag
 from cubestack.host.cli.device_options import add_target_arguments, given_options, open_any_target
 from cubestack.host.conformance.contract import CheckResult, CheckRun, Verdict
 from cubestack.host.conformance.suite import compare, run_suite
@@ -28,15 +29,13 @@ DETAIL_COLUMNS = 100
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_target_arguments(parser)
-    parser.add_argument(
-        "--allow-write", action="store_true", help="also send telecommands and write registers"
-    )
+    add_flag(parser, "--allow-write", "also send telecommands and write registers")
     parser.add_argument(
         "--compare",
         metavar="TARGET",
         help="compare with another target and show the first difference",
     )
-    parser.add_argument("--json", action="store_true", help="print one JSON object per check")
+    add_flag(parser, "--json", "print one JSON object per check")
 
 
 def run(args: argparse.Namespace) -> int:

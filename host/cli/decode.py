@@ -15,15 +15,16 @@ import json
 from pathlib import Path
 
 from cubestack.firmware_model.formats.recording import load_recording
+from cubestack.host.cli.arguments import add_flag, add_path
 from cubestack.host.devices.registry import device
 from cubestack.host.recording.transcript import TABLES, TranscriptEntry, transcript
 from cubestack.host.terminal import say
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("recording", type=Path, metavar="FILE", help="see docs/how-to/recording.md")
-    parser.add_argument("--out", type=Path, metavar="FILE.csv", help="or FILE.parquet")
-    parser.add_argument("--json", action="store_true", help="print one JSON object per message")
+    add_path(parser, "recording", "see docs/how-to/recording.md")
+    add_path(parser, "--out", "or FILE.parquet", "FILE.csv")
+    add_flag(parser, "--json", "print one JSON object per message")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
 from cubestack.firmware_model.values import whole
-from cubestack.host.cli.arguments import add_value
+from cubestack.host.cli.arguments import add_flag, add_path, add_value
 from cubestack.host.devices.device import PROFILE_OPTIONS, AnyDevice, BoardOption, Engine
 from cubestack.host.devices.registry import device_names, devices
 from cubestack.host.emulation.emulated import AnyEmulated, check_options
@@ -37,9 +37,7 @@ def add_start_arguments(
 ) -> None:
     """Declare the options for the seed, whose default is ``seed``, for faults and the engine."""
     add_value(parser, "seed", whole(seed, seed_help, 0))
-    parser.add_argument(
-        "--faults", type=Path, metavar="FILE", help="TOML fault plan (docs/how-to/faults.md)"
-    )
+    add_path(parser, "--faults", "TOML fault plan (docs/how-to/faults.md)")
     add_engine_arguments(parser)
 
 
@@ -107,17 +105,14 @@ def inject_plan(
 
 
 def add_record_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--record",
-        type=Path,
-        metavar="FILE",
-        help="record every byte of all ports to FILE (docs/how-to/recording.md)",
+    add_path(
+        parser, "--record", "record every byte of all ports to FILE (docs/how-to/recording.md)"
     )
-    parser.add_argument(
+    add_path(
+        parser,
         "--trace",
-        type=Path,
-        metavar="FILE.vcd",
-        help="write serial lines, buses, FPGA pins and firmware variables as a waveform",
+        "write serial lines, buses, FPGA pins and firmware variables as a waveform",
+        "FILE.vcd",
     )
 
 
@@ -133,23 +128,9 @@ def add_insight_arguments(parser: argparse.ArgumentParser) -> None:
             metavar="PORT",
         ),
     )
-    parser.add_argument(
-        "--gdb-wait",
-        action="store_true",
-        help="with --gdb: wait for gdb before the first instruction",
-    )
-    parser.add_argument(
-        "--profile-out",
-        type=Path,
-        metavar="FILE",
-        help="cycles by function and line of --firmware, for kcachegrind",
-    )
-    parser.add_argument(
-        "--coverage-out",
-        type=Path,
-        metavar="FILE",
-        help="executed lines of --firmware, as an lcov file",
-    )
+    add_flag(parser, "--gdb-wait", "with --gdb: wait for gdb before the first instruction")
+    add_path(parser, "--profile-out", "cycles by function and line of --firmware, for kcachegrind")
+    add_path(parser, "--coverage-out", "executed lines of --firmware, as an lcov file")
 
 
 def insight(
@@ -198,17 +179,15 @@ def add_target_arguments(parser: argparse.ArgumentParser) -> None:
         "--device", choices=device_names(), help="needed if TARGET does not name it"
     )
     parser.add_argument("--bench", metavar="TARGET", help="serial line with the bench protocol")
-    parser.add_argument(
-        "--backup", action="store_true", help="the serial line speaks the register protocol"
-    )
+    add_flag(parser, "--backup", "the serial line speaks the register protocol")
     add_value(parser, "baud", whole(None, "baud rate of the serial line", 1))
-    parser.add_argument("--scene", type=Path, metavar="FILE", help="for an emulated device")
+    add_path(parser, "--scene", "for an emulated device")
     add_value(parser, "seed", whole(0, "for an emulated device", 0))
     parser.add_argument(
         "--control", metavar="URL", help=f"control port of the emulation; its token is in ${TOKEN}"
     )
     add_board_arguments(parser)
-    parser.add_argument("--record", type=Path, metavar="FILE", help="record the session to FILE")
+    add_path(parser, "--record", "record the session to FILE")
 
 
 def open_any_target(text: str, args: argparse.Namespace) -> Target:

@@ -34,7 +34,7 @@ from cubestack.firmware_model.formats.linux_i2c import socket_path
 from cubestack.firmware_model.formats.setup import Setup
 from cubestack.firmware_model.values import whole
 from cubestack.host.cli import device_options
-from cubestack.host.cli.arguments import add_value
+from cubestack.host.cli.arguments import add_path, add_value
 from cubestack.host.cli.ports import LAST_PORT, add_port_arguments, check_linux, open_ports
 from cubestack.host.devices.registry import device, device_names, devices
 from cubestack.host.emulation.emulated import AnyEmulated, power_up
@@ -67,17 +67,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="device",
         help=", ".join(device_names()),
     )
-    parser.add_argument(
-        "--scene",
-        type=Path,
-        metavar="FILE",
-        help=f"TOML scene of the one device; default: {', or '.join(scenes)}",
-    )
-    parser.add_argument(
+    add_path(parser, "--scene", f"TOML scene of the one device; default: {', or '.join(scenes)}")
+    add_path(
+        parser,
         "--orbit",
-        type=Path,
-        metavar="FILE",
-        help="TOML orbit of the satellite that all devices are on (docs/how-to/orbit.md)",
+        "TOML orbit of the satellite that all devices are on (docs/how-to/orbit.md)",
     )
     add_port_arguments(parser)
     add_value(

@@ -16,10 +16,10 @@ examples:
 
 import argparse
 from collections.abc import Callable
-from pathlib import Path
 
 from cubestack.firmware_model.interface.codec.message import Interface
 from cubestack.firmware_model.interface.efm32gg.table import Processor
+from cubestack.host.cli.arguments import add_path
 from cubestack.host.devices.registry import device, device_names
 from cubestack.host.export.c_header import c_header
 from cubestack.host.export.cosmos import cosmos
@@ -44,7 +44,7 @@ OF_PROCESSOR: dict[str, Callable[[Processor], str]] = {"processor-c": processor_
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("device", choices=device_names(), help="device whose interface is written")
     parser.add_argument("--format", choices=(*OF_INTERFACE, *OF_PROCESSOR), required=True)
-    parser.add_argument("--out", type=Path, metavar="FILE", help="default: standard output")
+    add_path(parser, "--out", "default: standard output")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cubestack.firmware_model.values import whole
-from cubestack.host.cli.arguments import add_value
+from cubestack.host.cli.arguments import add_flag, add_path, add_value
 from cubestack.host.cli.device_options import add_board_arguments, given_options
 from cubestack.host.cli.ports import LAST_PORT
 from cubestack.host.devices.registry import device_names
@@ -49,17 +49,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--control", metavar="URL", help=f"control port of the emulation; its token is in ${TOKEN}"
     )
-    parser.add_argument(
-        "--record",
-        type=Path,
-        metavar="FILE",
-        help="record the session with a device that is not emulated here",
-    )
+    add_path(parser, "--record", "record the session with a device that is not emulated here")
     parser.add_argument("--scene", metavar="FILE", help="for an emulated device")
     add_value(parser, "seed", whole(None, "for an emulated device", 0))
     add_board_arguments(parser)
     add_value(parser, "port", whole(0, "port of the page (default: any free one)", 0, LAST_PORT))
-    parser.add_argument("--json", action="store_true", help="print the address as a JSON object")
+    add_flag(parser, "--json", "print the address as a JSON object")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -20,7 +20,7 @@ from cubestack.hdl.flow.area_report import area_json, area_table, areas
 from cubestack.hdl.flow.top import TopTable, designs_with_area, tops_in
 from cubestack.hdl.flow.verilog import verilog_file
 from cubestack.hdl.proofs.prover import Proof, verdict_json, verdict_text, verdicts
-from cubestack.host.cli.arguments import Parser, add_value
+from cubestack.host.cli.arguments import Parser, add_flag, add_path, add_value
 from cubestack.host.cli.waveform import find, show
 from cubestack.host.devices.registry import merged_tables
 from cubestack.host.terminal import progress, tell
@@ -89,36 +89,28 @@ def add_arguments(
         "area", help="list the tiles that every design uses", description=AREA
     )
     area.add_argument("names", metavar="NAME", nargs="*", help="designs; default: all")
-    area.add_argument("--json", action="store_true", help="as JSON")
-    area.add_argument(
-        "--ice40", action="store_true", help="count iCE40 cells too; needs the extra hdl"
-    )
-    area.add_argument(
-        "--fmax", action="store_true", help="place on an iCE40 HX8K; needs the extra place"
-    )
+    add_flag(area, "--json", "as JSON")
+    add_flag(area, "--ice40", "count iCE40 cells too; needs the extra hdl")
+    add_flag(area, "--fmax", "place on an iCE40 HX8K; needs the extra place")
     area.set_defaults(act=_area)
     verilog = actions.add_parser(
         "verilog", help="write a top as one Verilog file", description=VERILOG
     )
     verilog.add_argument("top", metavar="TOP", help="a top; a wrong name lists them")
-    verilog.add_argument("--out", type=Path, metavar="FILE", help="default: standard output")
+    add_path(verilog, "--out", "default: standard output")
     verilog.set_defaults(act=_verilog)
     prove = actions.add_parser("prove", help="prove properties of the designs", description=PROVE)
     prove.add_argument("names", metavar="NAME", nargs="*", help="proofs; default: all")
-    prove.add_argument("--json", action="store_true", help="print JSON when all are done")
+    add_flag(prove, "--json", "print JSON when all are done")
     prove.set_defaults(act=_prove)
     wave = actions.add_parser("wave", help="show the waveform of a failed test", description=WAVE)
     wave.add_argument("test", metavar="TEST", help="part of its name, or a VCD file")
     wave.add_argument(
         "--folder", type=Path, default=Path("out/hdl/waves"), help="default: %(default)s"
     )
-    wave.add_argument(
-        "--text", action="store_true", help="print text even if a viewer is installed"
-    )
+    add_flag(wave, "--text", "print text even if a viewer is installed")
     add_value(wave, "last", whole(20, "number of changes in the text", 1, metavar="N"))
-    wave.add_argument(
-        "--internal", action="store_true", help="include internal signals in the text"
-    )
+    add_flag(wave, "--internal", "include internal signals in the text")
     wave.set_defaults(act=_wave)
 
 

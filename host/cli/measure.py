@@ -21,7 +21,7 @@ from typing import Any
 from rich.table import Table
 
 from cubestack.firmware_model.values import number
-from cubestack.host.cli.arguments import add_failed, add_options, add_value, chosen
+from cubestack.host.cli.arguments import add_failed, add_flag, add_options, add_value, chosen
 from cubestack.host.cli.device_options import (
     add_engine_arguments,
     add_insight_arguments,
@@ -70,9 +70,7 @@ def add_devices(
         command = commands.add_parser(
             device.name, help=device.summary, description=experiment.description
         )
-        command.add_argument(
-            "--json", action="store_true", help="print one JSON object per result and nothing else"
-        )
+        add_flag(command, "--json", "print one JSON object per result and nothing else")
         add_options(command, experiment.options)
         add_board(command, (device, experiment))
         command.set_defaults(chosen=(device, experiment))
@@ -186,7 +184,7 @@ class ReportCommand:
         parser.add_argument(
             "device", nargs="?", choices=tuple(self.found), default=first, help=f"default {first}"
         )
-        parser.add_argument("--json", action="store_true", help="print one JSON object per result")
+        add_flag(parser, "--json", "print one JSON object per result")
         add_options(parser, *(experiment.options for _, experiment in self.found.values()))
         add_board(parser, *self.found.values())
 

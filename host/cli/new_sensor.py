@@ -15,6 +15,7 @@ from importlib.resources import files
 from importlib.util import find_spec
 from pathlib import Path
 
+from cubestack.host.cli.arguments import add_path
 from cubestack.host.devices.device import check_name
 from cubestack.host.devices.registry import device_names, devices
 from cubestack.host.terminal import tell
@@ -33,9 +34,7 @@ ADDRESSES = range(0x29, 0x78)
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("name", metavar="NAME", help="of the device: small letters and digits")
-    parser.add_argument(
-        "--out", type=Path, metavar="DIR", help="folder to write (default ./NAME-sensor)"
-    )
+    add_path(parser, "--out", "folder to write (default ./NAME-sensor)", "DIR")
 
 
 def run(args: argparse.Namespace) -> None:

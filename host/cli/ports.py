@@ -12,7 +12,7 @@ from cubestack.emulator.ports.rfc2217 import Rfc2217Endpoint
 from cubestack.emulator.ports.serial_port import SerialPort
 from cubestack.emulator.ports.tcp import TcpEndpoint
 from cubestack.firmware_model.values import whole
-from cubestack.host.cli.arguments import add_value
+from cubestack.host.cli.arguments import add_flag, add_path, add_value
 from cubestack.host.devices.registry import device_names
 from cubestack.host.emulation.emulated import AnyEmulated
 from cubestack.host.terminal import say
@@ -24,12 +24,12 @@ LAST_PORT = 65535
 def add_port_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options; a line has one end, so they exclude each other."""
     where = parser.add_mutually_exclusive_group()
-    where.add_argument(
+    add_path(
+        where,
         "--pty",
-        type=Path,
-        metavar="PATH",
-        help="link to a pseudo-terminal; for several devices, the prefix of their links; "
+        "link to a pseudo-terminal; for several devices, the prefix of their links; "
         "default: " + ", ".join(f"./tty{name.upper()}" for name in device_names()),
+        "PATH",
     )
     add_value(
         where, "tcp", whole(None, "serial line on a local TCP port", 0, LAST_PORT, metavar="PORT")
@@ -45,10 +45,10 @@ def add_port_arguments(parser: argparse.ArgumentParser) -> None:
             metavar="PORT",
         ),
     )
-    parser.add_argument(
+    add_flag(
+        parser,
         "--strict-line",
-        action="store_true",
-        help="pseudo-terminals have the baud rate, parity and stop bits that clients set, as "
+        "pseudo-terminals have the baud rate, parity and stop bits that clients set, as "
         "with --rfc2217; without it a mismatch is only reported",
     )
     parser.add_argument(
@@ -57,10 +57,10 @@ def add_port_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="ADDRESS",
         help=f"of the TCP port (default {LOOPBACK}); any other needs --allow-remote",
     )
-    parser.add_argument(
+    add_flag(
+        parser,
         "--allow-remote",
-        action="store_true",
-        help="accept connections from other machines; nothing protects the port",
+        "accept connections from other machines; nothing protects the port",
     )
 
 

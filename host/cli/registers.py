@@ -10,6 +10,7 @@ examples:
 
 import argparse
 
+from cubestack.host.cli.arguments import add_flag
 from cubestack.host.devices.registry import device, device_names
 from cubestack.host.export.interface import FORMATS, render, render_switches
 from cubestack.host.export.processor import render_processor
@@ -18,16 +19,12 @@ from cubestack.host.export.processor import render_processor
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("device", choices=device_names(), help="device whose interface is listed")
     parser.add_argument("--format", choices=tuple(FORMATS), default="table", help="default: table")
-    parser.add_argument(
+    add_flag(
+        parser,
         "--processor",
-        action="store_true",
-        help="registers and pin connections of the processor, for your own firmware",
+        "registers and pin connections of the processor, for your own firmware",
     )
-    parser.add_argument(
-        "--switches",
-        action="store_true",
-        help="switches between the published and better algorithms",
-    )
+    add_flag(parser, "--switches", "switches between the published and better algorithms")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -17,12 +17,11 @@ examples:
 import argparse
 import json
 from contextlib import ExitStack
-from pathlib import Path
 
 from cubestack.emulator.recording.replay import SETTLE_PS, Replay
 from cubestack.firmware_model.formats.recording import load_recording
 from cubestack.firmware_model.values import number
-from cubestack.host.cli.arguments import add_value
+from cubestack.host.cli.arguments import add_flag, add_path, add_value
 from cubestack.host.cli.device_options import add_record_arguments, add_start_arguments, record
 from cubestack.host.emulation.controls import EmulatedControls
 from cubestack.host.emulation.history import Recipe
@@ -34,15 +33,13 @@ LATEST_S = 1e8
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("recording", type=Path, metavar="FILE", help="see docs/how-to/recording.md")
-    parser.add_argument("--scene", type=Path, metavar="SCENE", help="replaces the recorded one")
+    add_path(parser, "recording", "see docs/how-to/recording.md")
+    add_path(parser, "--scene", "replaces the recorded one", "SCENE")
     add_start_arguments(parser, seed=None, seed_help="replaces the recorded one")
     add_record_arguments(parser)
     for name, what in (("trace_from", "begins"), ("trace_to", "ends")):
         add_value(parser, name, number(None, f"where --trace {what}", 0, LATEST_S, "s"))
-    parser.add_argument(
-        "--json", action="store_true", help="print one JSON object with all differences"
-    )
+    add_flag(parser, "--json", "print one JSON object with all differences")
 
 
 def run(args: argparse.Namespace) -> int:

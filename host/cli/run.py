@@ -26,7 +26,7 @@ from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.formats.linux_i2c import socket_path
 from cubestack.firmware_model.values import whole
 from cubestack.host.cli import device_options
-from cubestack.host.cli.arguments import add_value
+from cubestack.host.cli.arguments import add_flag, add_path, add_value
 from cubestack.host.cli.ports import check_linux
 from cubestack.host.devices.registry import device, device_names, devices
 from cubestack.host.emulation.emulated import AnyEmulated, open_device
@@ -64,9 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME=0xNN",
         help=f"change an address; NAME is {', '.join(_addresses())} or the old address",
     )
-    parser.add_argument(
-        "--scene", type=Path, metavar="FILE", help="TOML scene of the one device (default: its own)"
-    )
+    add_path(parser, "--scene", "TOML scene of the one device (default: its own)")
     device_options.add_start_arguments(parser)
     device_options.add_board_arguments(parser)
     add_value(parser, "hz", whole(STANDARD_HZ, "bus clock in bits per second (default 100000)", 1))
@@ -87,7 +85,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         choices=("seccomp", "preload"),
         help="how calls are intercepted (default: seccomp if the kernel allows it)",
     )
-    parser.add_argument("--quiet", action="store_true", help="don't print bus and route")
+    add_flag(parser, "--quiet", "don't print bus and route")
     parser.add_argument("program", nargs="+", metavar="PROGRAM", help="after --, with arguments")
 
 

@@ -22,6 +22,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from cubestack.host.cli.arguments import add_flag, add_path
 from cubestack.host.cli.device_options import add_target_arguments, open_any_target
 from cubestack.host.errors import HostError
 from cubestack.host.shell.language import CommandResult, Shell
@@ -41,10 +42,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="COMMANDS",
         help="commands separated by semicolons; repeatable",
     )
-    source.add_argument(
-        "--script", type=Path, metavar="FILE", help="file with one command per line"
-    )
-    parser.add_argument("--json", action="store_true", help="print one JSON object per command")
+    add_path(source, "--script", "file with one command per line")
+    add_flag(parser, "--json", "print one JSON object per command")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from cubestack.host.cli.arguments import add_flag
 from cubestack.host.devices.registry import devices
 from cubestack.host.emulation.emulated import AnyEmulated
 from cubestack.host.terminal import busy, tell
@@ -50,7 +51,7 @@ COMPARISON = "`make bench-engines` compares the engines that run the FPGA design
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the option, with the meaning of each figure."""
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    add_flag(parser, "--json", "print one JSON object")
     lines = [
         f"{name:<17} {device.title}: {meaning}"
         for device in devices()

@@ -18,6 +18,7 @@ from typing import Any
 
 from rich.table import Table
 
+from cubestack.host.cli.arguments import add_flag
 from cubestack.host.devices.device import AnyDevice
 from cubestack.host.devices.registry import devices
 from cubestack.host.terminal import busy, show, tell
@@ -61,8 +62,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--level", action="append", metavar="O2", help="compiler option; repeatable"
     )
     parser.add_argument("--precision", action="append", metavar="KIND", help="repeatable")
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
-    parser.add_argument("--write", action="store_true", help="rewrite data file and docs")
+    add_flag(parser, "--json", "print one JSON object")
+    add_flag(parser, "--write", "rewrite data file and docs")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.values import whole
-from cubestack.host.cli.arguments import add_value
+from cubestack.host.cli.arguments import add_path, add_value
 from cubestack.host.cli.device_options import add_option, given_options
 from cubestack.host.clients.contract import Progress
 from cubestack.host.clients.node import NodeClient
@@ -33,11 +33,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     names = [one.name for one in devices() if "demo" in one.studies]
     parser.add_argument("device", nargs="?", choices=names, help="run this one only; default: all")
     parser.add_argument("--out", type=Path, default=Path("out"), help="folder for the pictures")
-    parser.add_argument(
+    add_path(
+        parser,
         "--photographs",
-        type=Path,
-        metavar="DIR",
-        help="folder with JPEG photographs of the sky and their truth.json",
+        "folder with JPEG photographs of the sky and their truth.json",
+        "DIR",
     )
     add_value(parser, "seed", whole(1, "seed of the sensors' noise (default 1)", 0))
     for option in PROFILE_OPTIONS:

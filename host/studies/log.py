@@ -17,10 +17,9 @@ import csv
 import sys
 import time
 from contextlib import ExitStack
-from pathlib import Path
 
 from cubestack.firmware_model.values import number, whole
-from cubestack.host.cli.arguments import add_value
+from cubestack.host.cli.arguments import add_path, add_value
 from cubestack.host.cli.device_options import add_target_arguments, open_any_target
 from cubestack.host.cli.shell import split_commands
 from cubestack.host.clients.contract import Columns
@@ -33,7 +32,7 @@ from cubestack.host.terminal import say
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_target_arguments(parser)
-    parser.add_argument("--out", type=Path, metavar="FILE.csv", help="default: standard output")
+    add_path(parser, "--out", "default: standard output", "FILE.csv")
     add_value(parser, "count", whole(None, "lines; default: until Ctrl-C", 1, metavar="N"))
     add_value(parser, "interval", number(1.0, "of the lines (default 1)", 0, 86_400, "s"))
     for option, name, when in (("-c", "first", "the first line"), ("--each", "each", "every line")):

@@ -20,7 +20,7 @@ from cubestack.emulator.camera.common.view import View
 from cubestack.emulator.scene.attitude import quaternion_from_pointing
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.firmware_model.values import number, whole
-from cubestack.host.cli.arguments import add_value
+from cubestack.host.cli.arguments import add_flag, add_path, add_value
 from cubestack.host.clients.quaternions import pointing_deg
 from cubestack.host.devices.registry import device, device_names
 from cubestack.host.emulation.emulated import open_device
@@ -38,12 +38,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("device", choices=device_names())
     for name, (low, high, meaning) in ANGLES.items():
         add_value(parser, name, number(None, meaning, low, high, "deg"))
-    parser.add_argument("--scene", type=Path, metavar="FILE", help="TOML scene; its pose counts")
+    add_path(parser, "--scene", "TOML scene; its pose counts")
     parser.add_argument("--mag-limit", type=float, metavar="V", help="only brighter stars")
     add_value(parser, "seed", whole(0, "of the noise (default 0)", 0))
-    parser.add_argument(
-        "--stretched", action="store_true", help="lift faint stars for the eye; not for uploads"
-    )
+    add_flag(parser, "--stretched", "lift faint stars for the eye; not for uploads")
     parser.add_argument("--out", type=Path, required=True, metavar="FILE.png")
 
 

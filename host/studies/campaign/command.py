@@ -23,7 +23,7 @@ from pathlib import Path
 from rich.table import Table
 
 from cubestack.firmware_model.values import whole
-from cubestack.host.cli.arguments import add_value
+from cubestack.host.cli.arguments import add_flag, add_path, add_value
 from cubestack.host.experiments.rates import wilson
 from cubestack.host.studies.campaign import report, statistics
 from cubestack.host.studies.campaign.folder import (
@@ -54,26 +54,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "words", nargs="*", metavar="PLAN", help="file, or name of a plan shipped with a device"
     )
-    parser.add_argument(
-        "--list", action="store_true", help="list the plans shipped with the devices"
-    )
-    parser.add_argument(
-        "--out", type=Path, metavar="FOLDER", help="default: the plan's name, with .campaign"
-    )
-    parser.add_argument(
-        "--resume", action="store_true", help="continue with the rows in the folder"
-    )
+    add_flag(parser, "--list", "list the plans shipped with the devices")
+    add_path(parser, "--out", "default: the plan's name, with .campaign", "FOLDER")
+    add_flag(parser, "--resume", "continue with the rows in the folder")
     where = parser.add_mutually_exclusive_group()
     add_value(
         where, "workers", whole(None, "processes (default: one for each core)", 1, metavar="N")
     )
     where.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster")
-    parser.add_argument(
-        "--compare",
-        type=Path,
-        metavar="FOLDER",
-        help="for report: an earlier campaign of the same skies",
-    )
+    add_path(parser, "--compare", "for report: an earlier campaign of the same skies", "FOLDER")
     add_value(
         parser,
         "worst",
@@ -84,7 +73,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             metavar="N",
         ),
     )
-    parser.add_argument("--json", action="store_true", help="print one JSON object per point")
+    add_flag(parser, "--json", "print one JSON object per point")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -21,7 +21,7 @@ from pathlib import Path
 
 from cubestack.firmware_model.interface.codec.switches import PROFILES
 from cubestack.firmware_model.values import whole
-from cubestack.host.cli.arguments import add_value
+from cubestack.host.cli.arguments import add_flag, add_value
 from cubestack.host.devices.registry import devices
 from cubestack.host.studies.fidelity import table as fidelity
 from cubestack.host.studies.workers import cores
@@ -39,13 +39,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="keys of rows, e.g. 'sun-*'; repeatable",
     )
     parser.add_argument("--profile", choices=PROFILES, help="default: both")
-    parser.add_argument("--quick", action="store_true", help="a few pictures of each kind")
+    add_flag(parser, "--quick", "a few pictures of each kind")
     add_value(parser, "frames", whole(None, "pictures of each kind", 1, metavar="N"))
     add_value(
         parser, "workers", whole(None, "processes (default: one for each core)", 1, metavar="N")
     )
-    parser.add_argument("--json", action="store_true", help="print one JSON object per row")
-    parser.add_argument("--markdown", action="store_true", help="print the tables of the pages")
+    add_flag(parser, "--json", "print one JSON object per row")
+    add_flag(parser, "--markdown", "print the tables of the pages")
     parser.add_argument(
         "--write",
         nargs="?",

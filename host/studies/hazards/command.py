@@ -13,13 +13,12 @@ examples:
 
 import argparse
 import json
-from pathlib import Path
 
 from rich.table import Table
 
 from cubestack.firmware_model.interface.codec.switches import PROFILES
 from cubestack.firmware_model.values import whole
-from cubestack.host.cli.arguments import add_value
+from cubestack.host.cli.arguments import add_flag, add_path, add_value
 from cubestack.host.experiments.hazard_options import known
 from cubestack.host.experiments.rates import wilson
 from cubestack.host.studies.hazards import album, curves
@@ -33,20 +32,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--hazard", action="append", default=[], metavar="NAME", help="default: all; may be given "
         "again",
     )  # fmt: skip
-    parser.add_argument("--list", action="store_true", help="list hazards and their strengths")
+    add_flag(parser, "--list", "list hazards and their strengths")
     add_value(parser, "frames", whole(20, "of each strength (default 20)", 1, metavar="N"))
     add_value(parser, "seed", whole(0, "default 0", 0, metavar="N"))
     parser.add_argument("--profile", choices=PROFILES, default="extended", help="default: extended")
     add_value(
         parser, "workers", whole(None, "processes (default: one for each core)", 1, metavar="N")
     )
-    parser.add_argument(
+    add_path(
+        parser,
         "--out",
-        type=Path,
-        metavar="FOLDER",
-        help="write hazards.md there, or a part of it, with pictures, curves and points",
+        "write hazards.md there, or a part of it, with pictures, curves and points",
+        "FOLDER",
     )
-    parser.add_argument("--json", action="store_true", help="print one JSON object per point")
+    add_flag(parser, "--json", "print one JSON object per point")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -299,8 +299,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
 
     monkeypatch.setattr(campaign.CampaignPlan, "read", lambda path: path)
     monkeypatch.setattr(campaign.Folder, "begun", lambda *_of, **_how: made)
-    monkeypatch.setattr(campaign.campaigns, "count", lambda _plan: 8)
-    monkeypatch.setattr(campaign.campaigns, "run", run)
+    monkeypatch.setattr(campaign, "count", lambda _plan: 8)
+    monkeypatch.setattr(campaign, "run_into", run)
     monkeypatch.setattr(campaign.statistics, "rates", lambda _folder: made.ended)
     (tmp_path / "plan.toml").write_text("", "utf-8")
     monkeypatch.chdir(tmp_path)
