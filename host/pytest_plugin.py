@@ -126,7 +126,6 @@ def _options(item: pytest.Item) -> dict[str, Any]:
 def pytest_runtest_makereport(
     item: pytest.Item, call: pytest.CallInfo[None]
 ) -> "Generator[None, pytest.TestReport, pytest.TestReport]":
-    """Print the fault events of a failed test."""
     report = yield
     if call.when == "call" and report.failed:
         for name, device in item.stash.get(_DEVICES, {}).items():

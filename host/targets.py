@@ -238,7 +238,6 @@ def connect(text: str, device: str | None = None, *, baud: int | None = None) ->
 def _registers(
     interface: Interface, bus: I2cBus, wait: Callable[[float], None]
 ) -> RegisterClient | None:
-    """Client of a device's registers on ``bus``, or None."""
     registers = interface.registers
     return None if registers is None else RegisterClient(bus, registers, wait=wait)
 

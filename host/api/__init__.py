@@ -121,7 +121,6 @@ _HOMES: Final = {
 
 
 def __getattr__(name: str) -> Any:
-    """Load a name on first use."""
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     value = getattr(import_module(f"cubestack.{_HOMES[name]}"), name)
@@ -130,5 +129,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    """Every public name, loaded or not."""
     return sorted({*globals(), *__all__})

@@ -141,7 +141,6 @@ __all__ = [*_HOMES]
 
 
 def __getattr__(name: str) -> Any:
-    """Load a name at its first use."""
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     module, own_name = _HOMES[name]
@@ -151,5 +150,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    """Every public name, loaded or not."""
     return sorted({*globals(), *__all__})

@@ -33,7 +33,6 @@ class Parser(argparse.ArgumentParser):
         return f"{text}\ndocs/: {_documents()}\n" if "docs/" in text else text
 
     def error(self, message: str) -> NoReturn:
-        """End with exit status 2."""
         self.exit(2, f"{self.prog}: {message}; see {self.prog} --help\n")
 
 

@@ -93,7 +93,6 @@ class Reports:
     group: str = STUDIES
 
     def load(self) -> Any:
-        """The command; it loads the emulator."""
         found = {one.name: (one, report.load()) for one, report in self.declared}
         return resolve_name("cubestack.host.cli.measure:ReportCommand")(found)
 

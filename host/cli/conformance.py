@@ -39,7 +39,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the suite on one target, or on two."""
     show = _show_json if args.json else _show_text
     runs = []
     for number, text in enumerate([args.target, args.compare][: 1 + (args.compare is not None)]):

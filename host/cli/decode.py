@@ -28,7 +28,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Decode; returns 0."""
     recording = load_recording(args.recording)
     messages = transcript(recording, device(recording.device).interface)
     if args.out is not None:

@@ -80,7 +80,6 @@ def chosen_options(args: argparse.Namespace, device: AnyDevice) -> dict[str, Any
 def show_notices(
     device: AnyDevice, options: Mapping[str, Any], tell: Callable[[str], None]
 ) -> None:
-    """Print notices about the chosen ``options``."""
     for option in device.all_options:
         notice = option.notice(options[option.name]) if option.name in options else None
         if notice is not None:

@@ -44,7 +44,6 @@ SHOWN = 40
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the devices, each with options of its own."""
     for command in add_devices(parser, lambda device: device.experiment and device.experiment()):
         percent = number(
             None, "exit status 1 if fewer percent of the results are right", 0, 100, metavar="PCT"

@@ -90,7 +90,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the program; returns its exit status."""
     check_linux()
     if shutil.which(args.program[0]) is None:
         raise ValueError(f"{args.program[0]}: no such program; give a path, or a name on the PATH")

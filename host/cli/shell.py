@@ -47,7 +47,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the given commands, or prompt for them."""
     lines = _lines(args)
     target = open_any_target(args.target, args)
     try:

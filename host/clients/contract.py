@@ -44,7 +44,6 @@ class Exchanges:
         self.late += not answered
 
     def __add__(self, other: Self) -> "Exchanges":
-        """Of two clients together."""
         names = [one.name for one in fields(self)]
         return Exchanges(*(getattr(self, name) + getattr(other, name) for name in names))
 
@@ -73,11 +72,9 @@ class Closable(ABC):
         """Release the port or bus."""
 
     def __enter__(self) -> Self:
-        """Use it in a ``with`` block."""
         return self
 
     def __exit__(self, *_error: object) -> None:
-        """Close."""
         self.close()
 
 
@@ -199,7 +196,6 @@ class DeviceClient(Closable):
         self._on_close = callback
 
     def close(self) -> None:
-        """Release the port."""
         self._on_close()
 
     def picture(

@@ -64,7 +64,6 @@ def _request(interface: Interface) -> bytes:
 
 
 def _ask(line: Transport, interface: Interface) -> bytes:
-    """What comes after a request."""
     read_answer(line, 1 << 20, 0.0)  # drop earlier bytes
     line.write(_request(interface))
     return read_answer(line, MOST_BYTES, SILENCE_S)

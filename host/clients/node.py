@@ -121,5 +121,4 @@ class NodeClient(Client):
         self._transport.read(READ_BYTES, seconds)
 
     def close(self) -> None:
-        """Close the transport."""
         self._transport.close()

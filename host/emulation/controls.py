@@ -112,14 +112,12 @@ class EmulatedControls:
         self.on_act(("scene", str(path)), read_document(path).text)
 
     def currents(self) -> dict[str, float]:
-        """Supply currents in mA: all, and each channel's."""
         power = self._board.power
         return {"total": power.current_ma()} | {
             channel: power.current_ma(channel) for channel in self.channels
         }
 
     def switch(self, channel: str, on: bool) -> None:
-        """Switch a channel; ValueError for an unknown one."""
         if channel not in self.channels:
             raise TargetError(f"no channel {channel!r}; known: {', '.join(self.channels)}")
         self._board.power.switch(channel, on)

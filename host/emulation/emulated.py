@@ -81,7 +81,6 @@ class EmulatedDevice(Closable, Generic[BoardT_co, ClientT_co]):
         return self.board.kernel.now / PS_PER_S
 
     def wait(self, seconds: float) -> None:
-        """Let virtual time pass."""
         self.board.kernel.advance_to(self.board.kernel.now + round(seconds * PS_PER_S))
 
     @property

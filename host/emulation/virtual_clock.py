@@ -57,7 +57,6 @@ class VirtualClock:
 
     @contextmanager
     def follow(self, device: AnyEmulated) -> Iterator[None]:
-        """Follow the virtual time of ``device`` too."""
         if not self._devices:
             self._thread = threading.get_ident()
             self._elapsed_ns = 0

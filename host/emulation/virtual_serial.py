@@ -36,7 +36,6 @@ class VirtualSerial(Closable):
         return len(self._ahead)
 
     def read(self, size: int = 1) -> bytes:
-        """Read ``size`` bytes, or fewer if ``timeout`` expires."""
         left_s = LONGEST_S if self.timeout is None else self.timeout
         while self.in_waiting < size:
             began_ps = self._line.now_ps

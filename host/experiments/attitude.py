@@ -278,7 +278,6 @@ class AttitudeExperiment(Experiment[OpenerT, SkyOptionsT, AttitudeResultT]):
             yield f"what may help: {self.advice(results)}"
 
     def succeeded(self, results: Sequence[AttitudeResultT]) -> bool:
-        """Whether at least one has an attitude."""
         return any(result.solved for result in results)
 
     def sections(self, results: Iterable[Mapping[str, Any]]) -> Iterator[Section]:

@@ -25,7 +25,6 @@ class Facts(Result):
 
 
 def fact_lines(facts: Mapping[str, Any]) -> Iterator[str]:
-    """A line for each fact, for a reader."""
     for name, value in facts.items():
         yield f"{name.replace('_', ' '):>20}  {value}"
 

@@ -9,7 +9,6 @@ Outcome = Literal["right", "refused", "wrong"]
 
 
 def outcome(result: Any) -> Outcome:
-    """Outcome of a result with ``right`` and ``solved``."""
     return "right" if result.right else "wrong" if result.solved else "refused"
 
 

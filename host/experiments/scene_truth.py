@@ -38,7 +38,6 @@ def true_stars(
 
 
 def cameras_of(board: Any) -> Sequence[Any]:
-    """All image sensors of a board, in its order."""
     return list(board.cameras.values()) if hasattr(board, "cameras") else [board.camera]
 
 

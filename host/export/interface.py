@@ -13,7 +13,6 @@ from cubestack.host.export.side_protocols import side_json, side_markdown, side_
 
 
 def _table(interface: Interface) -> str:
-    """Plain text, one line per message and per field."""
     lines = [_summary(interface)]
     for kind in MessageKind:
         lines += ["", f"{kind.value.upper()}  (bit offset, type, name, meaning)"]

@@ -15,7 +15,6 @@ from cubestack.firmware_model.interface.efm32gg.table import (
 
 
 def render_processor(tables: Processor, format_name: str) -> str:
-    """The tables in one of the formats of ``export.interface``."""
     return _FORMATS[format_name](tables)
 
 

@@ -18,7 +18,6 @@ _UART = (
 
 
 def side_table(interface: Interface) -> Iterator[str]:
-    """Plain text, one line per register and letter."""
     if interface.registers is not None:
         yield from ("", f"REGISTERS at {_address(interface.registers)}  (address, access, type)")
         if interface.registers.note:

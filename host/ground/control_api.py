@@ -230,7 +230,6 @@ def _query(request: Request, call: Call) -> JsonObject:
 
 
 def _start_of(path: Path, count: int) -> bytes:
-    """The first ``count`` bytes of a growing file."""
     with path.open("rb") as stream:
         return stream.read(count)
 

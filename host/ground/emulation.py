@@ -152,7 +152,6 @@ class Emulation:
         self.port.resume()
 
     def step(self, events: int) -> int:
-        """Run ``events`` events; returns the number that ran."""
         return self.port.step(events)
 
     def run_to(self, to_s: float) -> "Future[int]":
@@ -162,7 +161,6 @@ class Emulation:
         return self.port.run_to(round(to_s * PS_PER_S))
 
     def snapshot(self, name: str) -> None:
-        """Save the current time as ``name``."""
         self._recorded()
         if len(self._snapshots) >= MOST_SNAPSHOTS and name not in self._snapshots:
             raise ValueError(f"at most {MOST_SNAPSHOTS} snapshots are possible")

@@ -137,7 +137,6 @@ class TargetSession:
 
     @property
     def controls(self) -> RemoteControls | None:
-        """Controls of an emulation in another process."""
         controls = self.target.controls
         return controls if isinstance(controls, RemoteControls) else None
 

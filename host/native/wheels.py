@@ -48,7 +48,6 @@ _EARLIEST = 315_532_800  # 1980, the first year of a zip archive
 
 
 def compiled(wanted: Iterable[Recipe], platform: str) -> dict[str, bytes]:
-    """Libraries for a platform, by their file names."""
     options = ["-target", PLATFORMS[platform], "-s"]
     if platform.startswith("macosx"):
         options.append("-Wl,-install_name,@rpath/library.so")  # else its path here
@@ -140,7 +139,6 @@ def _digest(content: bytes) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Build all, or the wheels of some platforms."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path, help="where the files go")
     parser.add_argument("platforms", nargs="*", metavar="PLATFORM", help=", ".join(PLATFORMS))

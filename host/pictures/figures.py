@@ -30,7 +30,6 @@ def figure(width: float, height: float) -> "Figure":
 
 
 def png(figure: "Figure") -> bytes:
-    """A figure as a PNG's bytes."""
     written = BytesIO()
     figure.savefig(written, format="png", dpi=110)
     return written.getvalue()

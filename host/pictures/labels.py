@@ -21,7 +21,6 @@ class Box:
     bottom: float
 
     def overlaps(self, other: "Box") -> bool:
-        """Whether the two have an area in common."""
         return (
             self.left < other.right
             and other.left < self.right
@@ -30,7 +29,6 @@ class Box:
         )
 
     def within(self, other: "Box") -> bool:
-        """Whether it lies in ``other`` whole."""
         return (
             other.left <= self.left
             and other.top <= self.top

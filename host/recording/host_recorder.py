@@ -46,7 +46,6 @@ class HostRecorder:
         self._writer = recording.RecordingWriter(self._stream, device, dict(bauds), self._setup)
 
     def line(self, transport: Transport, port: str, baud: int) -> Transport:
-        """``transport``, with its bytes recorded."""
         return _RecordingLine(self, transport, port, BITS_PER_BYTE * PS_PER_S // baud)
 
     def bus(self, bus: I2cBus) -> I2cBus:

@@ -62,7 +62,6 @@ COLUMNS = ("time_s", "port", "kind", "message", "error", *FIELD_COLUMNS)
 
 
 def transcript(recording: Recording, interface: Interface) -> list[TranscriptEntry]:
-    """All node-protocol requests of a recording, by time."""
     found = [*_on_the_line(recording.line(LINE), interface)]
     found += (one for transfer in recording.transfers if (one := _on_the_bus(transfer, interface)))
     return sorted(found, key=lambda one: one.time_s)
@@ -145,7 +144,6 @@ NUMBERS = ("time_s", "value")
 
 
 def csv_table(messages: Iterable[TranscriptEntry]) -> bytes:
-    """The table as a CSV file."""
     text = StringIO(newline="")
     writer = csv.DictWriter(text, COLUMNS)
     writer.writeheader()

@@ -88,7 +88,6 @@ class Shell:
         return self._silent_because
 
     def complete(self, line: str) -> list[str]:
-        """Completions of ``line``, in the order of the tables."""
         *before, word = line.split(" ")
         before = [part for part in before if part]
         known = _arguments(self.target, self._names, before) if before else list(self.commands)

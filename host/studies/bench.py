@@ -30,7 +30,6 @@ ROUNDS = 5
 
 
 def simulated_ratio(emulated: AnyEmulated, run: Callable[[], None]) -> float:
-    """Simulated seconds per wall second of ``run``."""
     virtual, wall = emulated.time_s, time.perf_counter()
     run()
     return round((emulated.time_s - virtual) / (time.perf_counter() - wall), 2)

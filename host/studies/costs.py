@@ -67,7 +67,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Measure, and show or write it."""
     report = _report(args.device)
     levels = _known("--level", args.level, report.levels)
     precisions = _known("--precision", args.precision, report.precisions)

@@ -118,7 +118,6 @@ def _served(words: Sequence[str], port: Path) -> Iterator[Path]:
 
 
 def download(what: str, fetch: Callable[[Progress], NDArray[np.uint8]]) -> NDArray[np.uint8]:
-    """The image from ``fetch``, with a progress bar."""
     with busy(f"downloading {what}") as shown:
         return fetch(shown)
 

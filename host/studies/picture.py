@@ -46,7 +46,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Make it; returns 0."""
     if args.out.suffix.lower() != ".png":
         raise ValueError(f"--out must end in .png, not be {args.out}")
     with open_device(args.device, _scene(args), seed=args.seed) as emulated:

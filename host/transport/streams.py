@@ -105,12 +105,10 @@ class SerialTransport(Reopening):
         return True
 
     def write(self, data: bytes) -> None:
-        """Send all of ``data``; raises PortClosedError."""
         with self._used():
             self._port.write(data)
 
     def read(self, max_bytes: int, timeout_s: float) -> bytes:
-        """As ``Transport.read``; raises PortClosedError."""
         with self._used():
             self._set_timeout(timeout_s)
             first: bytes = self._port.read(1)
@@ -155,7 +153,6 @@ class TcpTransport(Reopening):
             raise PortOpenError(f"can not open {self.name}: {_reason(error)}") from error
 
     def write(self, data: bytes) -> None:
-        """Send all of ``data``; raises PortClosedError."""
         with self._used():
             self._socket.sendall(data)
 

@@ -220,7 +220,6 @@ class Aramis(DeviceClient):
         ]
 
     def quality(self) -> Quality:
-        """Quality of the latest attitude and of its image."""
         values = self.client.telemetry("Quality")
         return Quality(
             **common(values),

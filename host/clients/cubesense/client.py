@@ -54,7 +54,6 @@ class Measurement:
 
     @property
     def detected(self) -> bool:
-        """Whether the angles are valid."""
         return self.detect is codes.DetectResult.SUCCESS
 
     @property
@@ -141,11 +140,9 @@ class CubeSense(DeviceClient):
         return self._wait_captured(camera).capture
 
     def result(self, camera: Camera) -> Measurement:
-        """A camera's latest measurement."""
         return self._measurement(camera, RESULTS[camera])
 
     def latest(self) -> Columns:
-        """Both cameras' latest measurements."""
         columns: Columns = {"uptime_s": self.uptime_s()}
         for camera in Camera:
             found, name = self.result(camera), camera.name.lower()
@@ -180,15 +177,12 @@ class CubeSense(DeviceClient):
         )
 
     def set_threshold(self, camera: Camera, threshold: int) -> None:
-        """Set a camera's detection threshold in DN."""
         self.client.command(f"DetectionThreshold{camera + 1}", Threshold=threshold)
 
     def set_auto_adjust(self, camera: Camera, enabled: bool) -> None:
-        """Enable or disable automatic exposure and gain."""
         self.client.command(f"AutoAdjust{camera + 1}", Enabled=int(enabled))
 
     def set_camera(self, camera: Camera, settings: CameraSettings) -> None:
-        """Set a camera's exposure and gains."""
         self.client.command(
             f"CameraSettings{camera + 1}",
             Exposure=settings.exposure,
@@ -236,7 +230,6 @@ class CubeSense(DeviceClient):
         return [None if area == _NO_MASK else area for area in areas]
 
     def threshold(self, camera: Camera) -> int:
-        """A camera's detection threshold in DN."""
         return int(self.client.telemetry("Configuration")[f"Threshold{camera + 1}"])
 
     def auto_adjust(self, camera: Camera) -> bool:
@@ -244,13 +237,11 @@ class CubeSense(DeviceClient):
         return bool(self.client.telemetry("Configuration")[f"AutoAdjust{camera + 1}"])
 
     def camera(self, camera: Camera) -> CameraSettings:
-        """A camera's exposure and gains as set."""
         values = self.client.telemetry("Configuration")
         names = ("Exposure", "Gain", "BlueGain", "RedGain")
         return CameraSettings(*(int(values[f"{name}{camera + 1}"]) for name in names))
 
     def power(self) -> Power:
-        """Supply currents and over-current flags."""
         values = self.client.telemetry("Power")
         return Power(
             current_3v3_ma=float(values["Current3V3"]),
@@ -264,7 +255,6 @@ class CubeSense(DeviceClient):
         self.client.command("ClearOverCurrent", Selection=selection)
 
     def reset(self, target: codes.ResetTarget) -> None:
-        """Restart a part of the node."""
         self.client.command("Reset", Target=target)
 
     def uptime_s(self) -> float:
@@ -289,7 +279,6 @@ class CubeSense(DeviceClient):
         return {name.lower(): int(value) / 1000.0 for name, value in values.items()}
 
     def details(self, camera: Camera) -> dict[str, Value]:
-        """Telemetry Details of a camera's latest measurement."""
         return self.client.telemetry(f"Details{camera + 1}")
 
     def quality(self, camera: Camera) -> DirectionQuality:

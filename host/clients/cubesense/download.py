@@ -76,7 +76,6 @@ def _prepare(client: Client, number: int) -> None:
 
 
 def _read(client: Client, number: int, sram: Sram) -> bytes:
-    """The frame, once it is ready."""
     expected = _wait_ready(client, number, sram)
     for _ in range(ATTEMPTS):
         frame = client.telemetry("ImageFrame")["Frame"]

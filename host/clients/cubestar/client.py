@@ -43,7 +43,6 @@ class Attitude:
 
     @property
     def boresight(self) -> NDArray[np.float64]:
-        """Inertial unit vector (3,) of the boresight."""
         x, y, z, w = self.quaternion
         return np.array([2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z])
 

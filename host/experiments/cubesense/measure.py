@@ -161,7 +161,6 @@ def _claimed(results: Sequence[SensorResult]) -> str | None:
 
 
 def _ratios(result: SensorResult) -> list[float]:
-    """Errors of alpha and beta divided by the claims."""
     if result.sigma_deg is None or result.error_deg is None:
         return []
     pairs = zip(

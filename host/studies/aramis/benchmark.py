@@ -23,7 +23,6 @@ HIGHEST_GAIN = 15.0
 
 
 def _figures(device: Device[AramisBoard, Aramis]) -> dict[str, float]:
-    """The loop, and wall times of its parts."""
     database = onboard_database()
     with power_up(device) as emulated:
         emulated.client.activate()

@@ -21,7 +21,6 @@ Point = tuple[tuple[str, Any], ...]
 
 
 def point_of(row: Row, names: Iterable[str]) -> Point:
-    """A row's point in the grid: names and values."""
     values = ((name, row.swept[name]) for name in names)
     return tuple((name, tuple(v) if isinstance(v, list) else v) for name, v in values)
 

@@ -32,7 +32,6 @@ class MemoryOptions(Options):
         CubeSenseSwitches.of(self.profile, self.set)
 
     def budget(self) -> tuple[Buffer, ...]:
-        """Buffers of the program with these options."""
         return budget(CubeSenseSwitches.of(self.profile, self.set))
 
 

@@ -67,7 +67,6 @@ def show(
     photographs: Path | None,
     board: Sequence[str],
 ) -> bool:
-    """Show both subjects; returns whether both were solved."""
     subjects = _sky(seed), _photograph(photographs)
     solved = [_show(device, subject, out, board) for subject in subjects]
     return all(solved)

@@ -199,7 +199,6 @@ def run_jobs(
 def filled(
     device: str, rows: Iterable[tuple[str, Row]], found: Mapping[Job, Figures]
 ) -> Iterator[Measured]:
-    """The rows with our values."""
     declared = fidelity_of(device)
     for table, row in rows:
         figures = {
