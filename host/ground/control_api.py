@@ -22,9 +22,9 @@ from starlette.responses import JSONResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from cubestack.host.ground import scenes
 from cubestack.host.ground.emulation import Emulation, JsonObject
-from cubestack.host.ground.guard import TooLargeError, refused
-from cubestack.host.ground.scenes import stars
+from cubestack.host.ground.guard import refusal, refused
 from cubestack.host.ground.traces import Trace
 from cubestack.host.pictures.images import png
 
@@ -111,17 +111,24 @@ def _then_state(act: Callable[..., None]) -> Callable[..., JsonObject]:
 def _pace(emulation: Emulation, pace: str, speed: float) -> JsonObject:
     if pace not in ("real", "fast"):
         raise ValueError(f"pace must be real or fast, not {pace!r}")
-    emulation.set_pace(pace, speed)  # type: ignore[arg-type]
+    emulation.port.set_pace(pace, speed)  # type: ignore[arg-type]
     return emulation.state()
 
 
 CALLS = (
     Call("GET", "/state", "time, pace, and state of each device", Emulation.state),
-    Call("POST", "/pause", "hold virtual time", _then_state(Emulation.pause)),
-    Call("POST", "/resume", "resume virtual time", _then_state(Emulation.resume)),
+    Call(
+        "POST", "/pause", "hold virtual time", _then_state(lambda emulation: emulation.port.pause())
+    ),
+    Call(
+        "POST",
+        "/resume",
+        "resume virtual time",
+        _then_state(lambda emulation: emulation.port.resume()),
+    ),
     Call(
         *("POST", "/step", "run a number of events, then hold"),
-        lambda emulation, events: {"events": emulation.step(events)},
+        lambda emulation, events: {"events": emulation.port.step(events)},
         {"events": (int, 1)},
     ),
     Call(
@@ -158,16 +165,22 @@ CALLS = (
         Emulation.trace,
         {"from_s": (NUMBER, REQUIRED), "to_s": (NUMBER, REQUIRED)},
     ),
-    Call("GET", "/devices/{device}/scene", "current scene, as a table", Emulation.scene),
-    Call("GET", "/devices/{device}/scene/keys", "keys of scene files", Emulation.scene_keys),
+    Call(
+        *("GET", "/devices/{device}/scene", "current scene, as a table"),
+        lambda emulation, device: scenes.present(emulation.of(device)),
+    ),
+    Call(
+        *("GET", "/devices/{device}/scene/keys", "keys of scene files"),
+        lambda emulation, device: scenes.keys(emulation.of(device).device),
+    ),
     Call(
         *("POST", "/devices/{device}/scene/look", "position of another scene on the sky"),
-        Emulation.look,
+        lambda emulation, device, table: scenes.look(emulation.of(device), table),
         {"table": (dict, REQUIRED)},
     ),
     Call(
         *("GET", "/stars", "stars of the catalogue, brightest first"),
-        lambda _emulation, mag_limit, epoch: stars(mag_limit, epoch),
+        lambda _emulation, mag_limit, epoch: scenes.stars(mag_limit, epoch),
         {"mag_limit": (NUMBER, 4.0), "epoch": (NUMBER, 2026.0)},
     ),
     Call(
@@ -213,14 +226,8 @@ async def _answer(emulation: Emulation, call: Call, request: Request) -> Respons
         if isinstance(answer, tuple):
             return Response(await asyncio.to_thread(_start_of, *answer), media_type="text/plain")
         return JSONResponse(answer)
-    except TooLargeError as error:
-        return refused(str(error), HTTPStatus.REQUEST_ENTITY_TOO_LARGE)
-    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
-        return refused(f"the body is not valid JSON: {error}", HTTPStatus.BAD_REQUEST)
-    except ValueError as error:
-        return refused(str(error), HTTPStatus.BAD_REQUEST)
-    except RuntimeError as error:
-        return refused(str(error), HTTPStatus.CONFLICT)
+    except (ValueError, RuntimeError) as error:
+        return refusal(error)
 
 
 def _query(request: Request, call: Call) -> JsonObject:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 from zlib import crc32
 
 import numpy as np
@@ -15,7 +15,6 @@ from cubestack.host.emulation.controls import EmulatedControls
 from cubestack.host.emulation.emulated import AnyEmulated
 from cubestack.host.emulation.virtual_serial import PS_PER_S
 from cubestack.host.errors import TargetError
-from cubestack.host.ground import scenes
 from cubestack.host.ground.traces import LONGEST_S as TRACE_S
 from cubestack.host.ground.traces import Bench, Trace
 
@@ -84,7 +83,7 @@ class Emulation:
 
     def about(self, device: str) -> JsonObject:
         """Options, ports and faults of a device; raises TargetError for an unknown one."""
-        one, controls = self._of(device), self._controls[device]
+        one, controls = self.of(device), self._controls[device]
         return {
             "title": one.device.title,
             "chosen": dict(one.chosen),
@@ -103,14 +102,14 @@ class Emulation:
 
     def log(self, device: str, since: int = 0) -> JsonObject:
         """Fault log from line ``since`` on, and its number of lines."""
-        self._of(device)
+        self.of(device)
         lines = self._controls[device].fault_log()
         return {"log": lines[max(0, since) :], "count": len(lines)}
 
     def pictures(self, device: str) -> JsonObject:
         """Images in its memories, and when a change of each was first detected."""
         found = {}
-        for name, picture in self._of(device).board.pictures().items():
+        for name, picture in self.of(device).board.pictures().items():
             key, known = (device, name), crc32(picture.tobytes())
             if self._checksums.get(key) != known:
                 self._checksums[key] = known
@@ -121,38 +120,20 @@ class Emulation:
 
     def picture(self, device: str, name: str) -> NDArray[np.uint8]:
         """A copy of the image; raises TargetError for an unknown one."""
-        pictures = self._of(device).board.pictures()
+        pictures = self.of(device).board.pictures()
         if name not in pictures:
             raise TargetError(f"no image {name!r}; known: {', '.join(pictures) or 'none'}")
         return pictures[name].copy()
-
-    def scene_keys(self, device: str) -> JsonObject:
-        return scenes.keys(self._of(device).device)
-
-    def scene(self, device: str) -> JsonObject:
-        return scenes.present(self._of(device))
-
-    def look(self, device: str, table: Mapping[str, Any]) -> JsonObject:
-        return scenes.look(self._of(device), table)
 
     def act(self, device: str, words: Sequence[str], text: str = "") -> None:
         """Execute a shell command; ``text`` is the content of the file that it names.
 
         Raises ValueError for an invalid command, RuntimeError while going back in time.
         """
-        self._of(device)
+        self.of(device)
         if not isinstance(self.past, str) and self.past.again:
             raise RuntimeError("the emulation is going back in time; wait until it arrives")
         self._controls[device].act(Control(self.port.kernel.now, tuple(words), text))
-
-    def pause(self) -> None:
-        self.port.pause()
-
-    def resume(self) -> None:
-        self.port.resume()
-
-    def step(self, events: int) -> int:
-        return self.port.step(events)
 
     def run_to(self, to_s: float) -> "Future[int]":
         """Run to a time as fast as possible and hold; done on arrival."""
@@ -194,7 +175,7 @@ class Emulation:
 
     def recording(self, device: str) -> tuple[Path, int]:
         """The recording of a device's ports, and its current size in bytes."""
-        one, past = self._of(device), self._recorded()
+        one, past = self.of(device), self._recorded()
         path = past.file(self.emulated.index(one))
         return path, path.stat().st_size
 
@@ -211,10 +192,8 @@ class Emulation:
             raise TargetError(f"no way back: {self.past}")
         return self.past
 
-    def set_pace(self, pace: Literal["real", "fast"], speed: float) -> None:
-        self.port.set_pace(pace, speed)
-
-    def _of(self, name: str) -> AnyEmulated:
+    def of(self, name: str) -> AnyEmulated:
+        """A device by name; raises TargetError for an unknown one."""
         for one in self.emulated:
             if one.device.name == name:
                 return one

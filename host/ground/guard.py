@@ -4,6 +4,7 @@ Otherwise any page in the user's browser could reach a port on loopback: by DNS 
 request whose answer it need not read.
 """
 
+import json
 import secrets
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -15,6 +16,7 @@ from starlette.requests import cookie_parser
 from starlette.responses import JSONResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from cubestack.host.errors import HostError
 from cubestack.host.ground.serving import loopback_name
 
 COOKIE = "cubestack"
@@ -111,6 +113,14 @@ class TooLargeError(ValueError):
     """A body above `LARGEST_BODY`."""
 
 
+STATUS = {
+    TooLargeError: HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
+    HostError: HTTPStatus.BAD_GATEWAY,
+    RuntimeError: HTTPStatus.CONFLICT,
+}
+"""Of the answer by the error; of others, 400."""
+
+
 class _Limited:
     """Raises TooLargeError for a body above `LARGEST_BODY`."""
 
@@ -133,6 +143,16 @@ def _with_headers(send: Send) -> Send:
         await send(message)
 
     return send_with_headers
+
+
+def refusal(error: Exception) -> Response:
+    """The answer to a request that raised ``error``."""
+    if isinstance(error, UnicodeDecodeError | json.JSONDecodeError | RecursionError):
+        return refused(f"the body is not valid JSON: {error}", HTTPStatus.BAD_REQUEST)
+    for kind, status in STATUS.items():
+        if isinstance(error, kind):
+            return refused(str(error), status)
+    return refused(str(error), HTTPStatus.BAD_REQUEST)
 
 
 def refused(why: str, status: HTTPStatus) -> Response:

@@ -22,7 +22,7 @@ from cubestack.host.errors import HostError
 from cubestack.host.ground import relays
 from cubestack.host.ground.emulation import JsonObject
 from cubestack.host.ground.emulators import UploadedFile
-from cubestack.host.ground.guard import TooLargeError, refused
+from cubestack.host.ground.guard import refusal, refused
 from cubestack.host.ground.logs import recording, results_table, transcript_table
 from cubestack.host.ground.relays import forward
 from cubestack.host.ground.session import TargetSession
@@ -117,14 +117,8 @@ async def _answer(handler: Any, session: TargetSession, request: Request) -> Res
             raise ValueError("the body must be a JSON object")
         answer = await handler(session, body, request.path_params)
         return answer if isinstance(answer, Response) else JSONResponse(answer)
-    except TooLargeError as error:
-        return refused(str(error), HTTPStatus.REQUEST_ENTITY_TOO_LARGE)
-    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
-        return refused(f"the body is not valid JSON: {error}", HTTPStatus.BAD_REQUEST)
-    except HostError as error:
-        return refused(str(error), HTTPStatus.BAD_GATEWAY)
-    except ValueError as error:
-        return refused(str(error), HTTPStatus.BAD_REQUEST)
+    except (ValueError, RecursionError, HostError) as error:
+        return refusal(error)
 
 
 async def _shell(session: TargetSession, body: JsonObject, _path: JsonObject) -> JsonObject:
