@@ -4,7 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from PIL import Image, ImageDraw
+from PIL import Image
 
 from cubestack.emulator.scene.hipparcos import load_sky
 from cubestack.firmware_model.interface.cubesense.codes import Camera
@@ -33,23 +33,10 @@ from cubestack.host.pictures.images import (
 )
 from cubestack.host.pictures.sheet import GRID, TRUTH, Colour
 from cubestack.host.pictures.star_names import _NAMES, star_name
+from tests.host.pictures.conftest import Text
 from tests.host.pictures.test_images import CAMERA, SHAPE, Found
 
 SENSE = np.full((480, 640), 34, np.uint8)
-
-
-@pytest.fixture
-def captions(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """All texts, in drawing order."""
-    seen = list[str]()
-    whole = ImageDraw.ImageDraw.text
-
-    def text(self, xy, text, fill=None, font=None):  # type: ignore[no-untyped-def]
-        seen.append(text)
-        whole(self, xy, text, fill, font)
-
-    monkeypatch.setattr(ImageDraw.ImageDraw, "text", text)
-    return seen
 
 
 def ink(image: object, colour: Colour, rows: int) -> NDArray[np.float64]:
@@ -80,32 +67,42 @@ def test_annotate_writes_the_sheet(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("known", "unknown"), [(0, 0), (0, 2), (2, 0), (2, 1)])
-def test_legend_explains_the_drawn_marks(known: int, unknown: int, captions: list[str]) -> None:
+def test_legend_explains_the_drawn_marks(known: int, unknown: int, written: list[Text]) -> None:
     stars = [Found(100, 80, 32349)] * known + [Found(300, 200, None)] * unknown
     image = star_sheet(np.zeros(SHAPE, np.uint8), stars, "sky")
     for colour, number, text in (
         (IDENTIFIED, known, "identified by the device"),
         (UNKNOWN, unknown, "found, not identified"),
     ):
-        assert bool(len(ink(image, colour, SHAPE[0]))) == (text in captions) == (number > 0)
-    assert f"{known + unknown} stars found, {known} of them identified" in captions
-    assert ("Sirius" in captions) == (known > 0)
-    assert not any("boresight" in text or "true" in text for text in captions)
-    captions.clear()
+        assert bool(len(ink(image, colour, SHAPE[0]))) == (text in written) == (number > 0)
+    assert f"{known + unknown} stars found, {known} of them identified" in written
+    assert ("Sirius" in written) == (known > 0)
+    assert not any("boresight" in text or "true" in text for text in written)
+    written.clear()
     star_sheet(np.zeros(SHAPE, np.uint8), stars, "sky", (), CAMERA.directions)
-    assert "boresight, angles from it" in captions
+    assert "boresight, angles from it" in written
+
+
+def test_caption_counts_found_and_omitted_stars(written: list[Text]) -> None:
+    stars, truth = [Found(100, 80, 32349)], [TrueStar(32349, 101, 80), TrueStar(1, 400, 50)]
+    star_sheet(np.zeros(SHAPE, np.uint8), stars, "sky", ["7 spots too small"], None, truth)
+    caption = " ".join(written)
+    assert "1 stars found, 1 of them identified" in caption
+    assert "left out: 7 spots too small" in caption
+    assert "1 of the 2 bright stars in the field found" in caption
+    assert "true place" in caption
 
 
 @pytest.mark.parametrize(("away", "found"), [(2.9, 1), (3.1, 0)])
 @pytest.mark.parametrize("turned", [0, 0.8, 1.57, 4])
 def test_star_counts_as_found_within_3_px(
-    away: float, found: int, turned: float, captions: list[str]
+    away: float, found: int, turned: float, written: list[Text]
 ) -> None:
     truth = TrueStar(1, 100 + away * np.cos(turned), 80 + away * np.sin(turned))
     star_sheet(
         np.zeros(SHAPE, np.uint8), [Found(9, 9, 1), Found(100, 80, None)], "", (), None, [truth]
     )
-    assert f"{found} of the 1 bright stars in the field found" in " ".join(captions)
+    assert f"{found} of the 1 bright stars in the field found" in " ".join(written)
 
 
 def test_truth_marks_are_wider_than_found_marks() -> None:
@@ -166,12 +163,12 @@ def test_stretch_of_a_faint_picture_is_limited(above: int, brightness: float) ->
 @pytest.mark.parametrize(("size", "scale"), [(1.0, "20"), (0.5, "50"), (0.004, "10000")])
 @pytest.mark.parametrize("turned", [0.3, 2.0, 4.5])
 def test_residual_arrow_starts_at_its_place_and_is_magnified(
-    size: float, scale: str, turned: float, tmp_path: Path, captions: list[str]
+    size: float, scale: str, turned: float, tmp_path: Path, written: list[Text]
 ) -> None:
     places = np.array([[100.0, 50.0], [300.0, 200.0]])
     along = np.array([np.cos(turned), np.sin(turned)])
     save_residuals(places, np.array([size * along, -size * along]), tmp_path / "residuals.png")
-    assert f"magnified {scale} times" in captions[0]
+    assert f"magnified {scale} times" in written[0]
     image = opened(tmp_path / "residuals.png")
     assert image.shape[:2] == (200 + 80, 300 + 80)
     arrows = ink(image, ARROW, image.shape[0])
@@ -204,26 +201,26 @@ def middle(image: NDArray[np.uint8], colour: Colour) -> tuple[float, float]:
     return float(x), float(y)
 
 
-def test_nadir_is_marked_and_captioned(tmp_path: Path, captions: list[str]) -> None:
+def test_nadir_is_marked_and_captioned(tmp_path: Path, written: list[Text]) -> None:
     fitted, truth = (10.0, -5.0, 0.0), (-20.0, 15.0)
     annotate_nadir(SENSE, np.array([[50.0, 70.0]]), fitted, tmp_path / "n.png", "Earth", truth)
     image = opened(tmp_path / "n.png")
     for colour, angles in ((FITTED, fitted[:2]), (TRUTH, truth)):
         place = pixel(Camera.NADIR, direction(*angles)[None])[0]
         assert middle(image, colour) == pytest.approx(place, abs=1)
-    text = " ".join(captions)
+    text = " ".join(written)
     assert "Earth 1 edges found; centre at alpha +10.00°, beta -5.00° (this program" in text
     assert "truth alpha -20.00°, beta +15.00°" in text
     assert {"edge found on a scanned line", "centre found", "truth (unknown to the device)"} <= {
-        *captions
+        *written
     }
-    assert "limb fitted" not in captions
+    assert "limb fitted" not in written
     sizes = [np.ptp(ink(image, colour, 960), axis=0).max() / 2 for colour in (EDGE, FITTED, TRUTH)]
     assert sizes == sorted(sizes)
     assert 3 < sizes[0] < sizes[2] < 40
 
 
-def test_limb_is_drawn_and_captioned(tmp_path: Path, captions: list[str]) -> None:
+def test_limb_is_drawn_and_captioned(tmp_path: Path, written: list[Text]) -> None:
     annotate_nadir(SENSE, np.zeros((0, 2)), (4.0, -3.0, 50.0), tmp_path / "n.png")
     green = ink(opened(tmp_path / "n.png"), FITTED, 960)
     rim = 2 * (limb(4.0, -3.0, 50.0) + 0.5)
@@ -232,9 +229,9 @@ def test_limb_is_drawn_and_captioned(tmp_path: Path, captions: list[str]) -> Non
     off = np.hypot(*(green - centre).T) > 30
     assert apart[off].min(axis=1).max() < 8
     assert apart.min(axis=0).max() < 4
-    assert "radius 50.00°" in " ".join(captions)
-    assert "limb fitted" in captions
-    assert "this program tells no radius" not in " ".join(captions)
+    assert "radius 50.00°" in " ".join(written)
+    assert "limb fitted" in written
+    assert "this program tells no radius" not in " ".join(written)
 
 
 def test_limb_points_have_the_same_angle_from_the_axis() -> None:
@@ -254,17 +251,17 @@ def test_limb_points_have_the_same_angle_from_the_axis() -> None:
         assert len(np.unique(rim.round(6), axis=0)) == len(rim) >= 90
 
 
-def test_missing_earth_is_captioned(tmp_path: Path, captions: list[str]) -> None:
+def test_missing_earth_is_captioned(tmp_path: Path, written: list[Text]) -> None:
     annotate_nadir(SENSE, np.zeros((0, 2)), None, tmp_path / "n.png")
-    assert "nadir camera" in captions
-    assert "0 edges found; no Earth found" in captions
-    assert "centre found" not in captions
-    assert "boresight, angles from it" in captions
+    assert "nadir camera" in written
+    assert "0 edges found; no Earth found" in written
+    assert "centre found" not in written
+    assert "boresight, angles from it" in written
 
 
 @pytest.mark.parametrize("first", [(100, 90), (500, 90), (100, 400), (500, 400)])
 def test_sun_window_is_enlarged_in_the_farthest_corner(
-    first: tuple[int, int], tmp_path: Path, captions: list[str]
+    first: tuple[int, int], tmp_path: Path, written: list[Text]
 ) -> None:
     origin = np.array(FULL_SIZE.window_origin(*first))
     side = FULL_SIZE.window
@@ -294,8 +291,8 @@ def test_sun_window_is_enlarged_in_the_farthest_corner(
     y = 0 if first[1] > 240 else 960 - border
     assert np.all(image[y, x : x + border] == GRID)
     assert np.all(image[y : y + border, x + border - 1] == GRID)
-    assert "Sun at alpha +0.00°, beta +0.00°; truth alpha +1.00°, beta +2.00°" in captions
-    assert {"window that is read, enlarged in the corner", "centroid found"} <= {*captions}
+    assert "Sun at alpha +0.00°, beta +0.00°; truth alpha +1.00°, beta +2.00°" in written
+    assert {"window that is read, enlarged in the corner", "centroid found"} <= {*written}
 
 
 def test_enlarged_window_marks_found_and_true_sun(tmp_path: Path) -> None:
@@ -325,11 +322,11 @@ def test_window_at_the_border_is_enlarged(first: tuple[int, int], tmp_path: Path
     assert 100 < far.sum() <= 256
 
 
-def test_missing_sun_is_captioned(tmp_path: Path, captions: list[str]) -> None:
+def test_missing_sun_is_captioned(tmp_path: Path, written: list[Text]) -> None:
     annotate_sun(SENSE, (0x3FF, 0x1FF), None, tmp_path / "s.png")
     image = opened(tmp_path / "s.png")
     assert not len(ink(image, EDGE, 960)) + len(ink(image, FITTED, 960))
-    assert "no Sun found" in captions
-    assert "sun camera" in captions
-    assert "centroid found" not in captions
-    assert "boresight, angles from it" in captions
+    assert "no Sun found" in written
+    assert "sun camera" in written
+    assert "centroid found" not in written
+    assert "boresight, angles from it" in written
