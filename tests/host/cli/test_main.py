@@ -66,49 +66,6 @@ def test_help_exits_with_0(run: Run, command: str | None) -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ((), ("COMMAND",)),
-        (("launch",), ("launch", "measure")),
-        (("measure",), ("device",)),
-        (("measure", "cubestarr"), ("cubestarr", "cubestar")),
-        (("emulate", "cubestarr"), ("cubestarr", "cubestar")),
-        (("measure", "cubestar", "--frames", "0"), ("0", "at least 1")),
-        (("measure", "cubestar", "--crop", "0;256"), ("0;256", "a list of 2 numbers")),
-        (("measure", "cubestar", "--crop", "0,256"), ("--crop", "--image")),
-        (("measure", "cubestar", "--camera", "c.json"), ("--camera", "--image")),
-        (("measure", "cubestar", "--image", "a.png", "--scene", "b.toml"), ("--scene", "--image")),
-        (("measure", "cubestar", "--mag-limit", "nan"), ("mag-limit", "nan", "number")),
-        (("measure", "cubestar", "--scene", "a.toml", "--mag-limit", "3"), ("scene", "mag_limit")),
-        (("measure", "cubestar", "--image", "a.png", "--false-stars", "1"), ("--false-stars",)),
-        (("measure", "cubestar", "--image", "a.png", "--no-noise"), ("--no-noise",)),
-        (("catalogue", "--epoch", "inf"), ("--epoch: must be a number, not inf",)),
-        (("demo", "--seed", "-1"), ("seed", "-1")),
-        (("measure", "cubestar", "--mode", "guessing"), ("guessing", "tracking")),
-        (("emulate", "cubestar", "--pty", "a", "--tcp", "4000"), ("--pty", "--tcp")),
-        (("emulate", "cubestar", "--tcp", "70000"), ("70000", "65535")),
-        (("emulate", "aramis", "--engine", "compiled"), ("--engine", "FPGA")),
-        (("emulate", "cubestar", "cubestar"), ("once", "cubestar")),
-        (("emulate", "cubestar", "--mcu-addressing"), ("--mcu-addressing", "cubesense")),
-        (("emulate", "cubestar", "--i2c", "256"), ("256", "255")),
-        (("emulate", "cubestar", "--baud", "0"), ("baud", "0")),
-        (("emulate", "cubestar", "--pace", "slow"), ("slow", "fast")),
-        (("registers", "cubestar", "--format", "pdf"), ("pdf", "markdown")),
-        (("measure", "cubestar", "--scene", "missing.toml"), ("missing.toml", "No such file")),
-        (("measure", "cubestar", "--image", "missing.png"), ("missing.png", "No such file")),
-        (("measure", "cubesense", "--search", "samples", "--memory", "other"), ("--memory other",)),
-        (("measure", "cubesense", "--scene", "a.toml", "--tilt", "3"), ("--tilt", "scene")),
-        (("measure", "cubesense", "--scene", "a.toml", "--no-noise"), ("--no-noise", "scene")),
-        (("measure", "cubesense", "--mode", "lis"), ("--mode",)),
-    ],
-)
-def test_wrong_arguments_are_one_line(
-    run: Run, arguments: tuple[str, ...], words: tuple[str, ...]
-) -> None:
-    check_one_line(run(*arguments), *words)
-
-
-@pytest.mark.parametrize(
     ("text", "said"),
     [("kind = sky", "not a TOML file"), ('kind = "picture"\nfile = "none.png"', "none.png")],
 )
@@ -303,7 +260,3 @@ def test_verbose_logs_loaded_libraries_and_quiet_logs_nothing(tmp_path: Path) ->
     assert "INFO cubestack.emulator.native.cache: " in told
     assert loudness("--quiet", environment=environment) == ""
     assert "INFO" not in loudness(environment=environment)
-
-
-def test_verbose_and_quiet_exclude_each_other(run: Run) -> None:
-    assert run("-v", "-q", "bench").code == WRONG_CALL

@@ -15,51 +15,6 @@ from ...conftest import Run
 FAILED, WRONG_CALL = 1, 2
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (("decode", "{folder}/none.rec"), "{folder}/none.rec: No such file or directory"),
-        (("replay", "{folder}"), "{folder}: Is a directory"),
-        (("demo", "--out", "/proc/cubestack"), "/proc/cubestack: No such file or directory"),
-        (
-            ("measure", "cubestar", "--scene", "{folder}"),
-            "{folder} can not be read: Is a directory",
-        ),
-        (("measure", "cubestar", "--firmware", "{folder}"), "{folder}: Is a directory"),
-        (
-            ("shell", "/dev/ttyNONE", "--device", "cubestar"),
-            "can not open /dev/ttyNONE: No such file or directory",
-        ),
-        (
-            ("shell", "/dev/null", "--device", "cubestar"),
-            "can not open /dev/null: it is no serial port (Inappropriate ioctl for device)",
-        ),
-        (
-            ("emulate", "aramis", "--pty", "{folder}/none/tty"),
-            "can not create the link {folder}/none/tty: No such file or directory",
-        ),
-        (
-            ("emulate", "aramis", "--tcp", "0", "--listen", "192.0.2.1", "--allow-remote"),
-            "can not listen on 192.0.2.1:0: Cannot assign requested address; choose another port",
-        ),
-        (
-            ("emulate", "aramis", "--control", "0", "--listen", "0.0.0.0"),
-            "0.0.0.0 can be reached from other machines: take 127.0.0.1, or give --allow-remote",
-        ),
-        (
-            ("emulate", "aramis", "--listen", "0.0.0.0"),
-            "--listen: of which port? It goes with --tcp, --rfc2217 or --control",
-        ),
-    ],
-)
-def test_error_is_one_plain_line(
-    run: Run, tmp_path: Path, words: tuple[str, ...], said: str
-) -> None:
-    outcome = run(*(word.format(folder=tmp_path) for word in words))
-    assert outcome.code in (FAILED, WRONG_CALL)
-    assert outcome.line == f"cubestack {words[0]}: {said.format(folder=tmp_path)}"
-
-
 def process(text: str, **environment: str) -> "subprocess.CompletedProcess[str]":
     """A Python process that runs ``text``."""
     return subprocess.run(

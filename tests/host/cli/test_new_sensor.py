@@ -44,22 +44,5 @@ def test_the_folder_is_named_after_the_sensor(
     )
 
 
-@pytest.mark.parametrize(
-    ("name", "reason"),
-    [
-        ("sun-slit", "a device's name is an identifier of small letters, not sun-slit"),
-        ("Glow", "a device's name is an identifier of small letters, not Glow"),
-        ("class", "a device's name is an identifier of small letters, not class"),
-        ("aramis", "aramis is a device already; choose another name"),
-        ("numpy", "numpy is a Python module already; choose another name"),
-    ],
-)
-def test_rejects_a_name(name: str, reason: str, run: Run, tmp_path: Path) -> None:
-    outcome = run("new-sensor", name, "--out", tmp_path / "sensor")
-    assert outcome.code == 2
-    assert outcome.line == f"cubestack new-sensor: {reason}"
-    assert not list(tmp_path.iterdir())
-
-
 def test_takes_an_address_that_no_device_has() -> None:
     assert "i2c_address=0x29" in dict(rendered("glow"))["glow/__init__.py"]

@@ -35,24 +35,6 @@ def test_text_output(run: Run) -> None:
     assert "published triangles  265292" in out
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (("aramis", "--pair-limit", "40"), "--pair-limit has no effect for aramis"),
-        (("--fov", "20"), "--fov has no effect for cubestar"),
-        (("cubestar", "--output", "x"), "--output has no effect for cubestar"),
-        (("aramis", "--fov", "100"), "fov_deg must be 1 to 60 deg, not 100.0"),
-        (("aramis", "--mag-limit", "9"), "mag_limit must be 0 to 7.5, not 9.0"),
-        (("aramis", "--fov", "1", "--mag-limit", "1"), "stars form no triangle"),
-    ],
-)
-def test_rejects_options_without_effect(run: Run, arguments: tuple[str, ...], words: str) -> None:
-    outcome = run("catalogue", *arguments)
-    assert outcome.code == 2
-    assert outcome.line.startswith("cubestack catalogue: ")
-    assert words in outcome.line
-
-
 def test_names_an_output_that_cannot_be_written(tmp_path: Path, run: Run) -> None:
     outcome = run("catalogue", "aramis", *SMALL, "--output", tmp_path / "no" / "x")
     assert (outcome.code, str(tmp_path / "no" / "x") in outcome.line) == (1, True)

@@ -160,29 +160,3 @@ def test_run_resume_report_and_replay(
     assert main(["campaign", "replay", "false.campaign", "3"]) == 0
     again = json.loads(capsys.readouterr().out)
     assert again.items() >= json.loads(rows[3])["result"].items()
-
-
-@pytest.mark.parametrize(
-    ("words", "error"),
-    [
-        (["nothing.toml"], "No such file"),
-        (["a.toml", "b.toml"], "one plan at a time"),
-        (["report"], "report wants a campaign's folder"),
-        (["a.toml", "--compare", "b"], "--compare is for a report"),
-        (["replay"], "replay wants a campaign's folder and the number of a row"),
-        (["parquet"], "parquet wants a campaign's folder"),
-        (["replay", "nowhere", "1"], "nowhere is no campaign's folder"),
-    ],
-)
-def test_rejects_wrong_arguments_in_one_line(
-    words: list[str],
-    error: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert main(["campaign", *words]) != 0
-    told = capsys.readouterr().err
-    assert error in told
-    assert told.count("\n") == 1

@@ -108,17 +108,3 @@ def test_rejects_a_page_without_markers_and_a_file_as_folder(
     assert "hazards.md has no lines <!-- hazards -->" in capsys.readouterr().err
     assert main(["hazards", "cubestar", "--out", str(tmp_path / "hazards.md")]) == 2
     assert "is a file; a folder would be right" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["cubestar", "--hazard", "rain"], "cubestar has no 'rain'; known: aberration"),
-        (["nobody"], "no device 'nobody'; known: cubestar"),
-    ],
-)
-def test_rejects_unknown_hazards_and_devices(
-    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["hazards", *arguments]) == 2
-    assert message in capsys.readouterr().err
