@@ -1,8 +1,6 @@
-"""Memory, settings before a measurement, sections and worst cases: what they say and send."""
+"""Memory, settings before a measurement and the ball: what they say and send."""
 
-from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,18 +9,9 @@ import pytest
 
 from cubestack.emulator.iss.insight.reports import MemoryUse
 from cubestack.emulator.native.compiler import find_compiler
-from cubestack.host.devices.experiment import Section
 from cubestack.host.experiments.aramis import measure as aramis
-from cubestack.host.studies.campaign import report
-from cubestack.host.studies.campaign import worst as module
-from cubestack.host.studies.campaign.folder import Folder, run
-from cubestack.host.studies.campaign.plan import CampaignPlan
-from cubestack.host.studies.campaign.worst import worst
 from cubestack.host.studies.cubestar import memory
 from cubestack.host.studies.fidelity.table import Job, perform
-from tests.host.studies.campaign.conftest import failing, plan
-
-__all__ = ["failing", "plan"]
 
 USE = MemoryUse(
     **{"flash": 262_144, "flash_size": 1 << 20, "ram_size": 1 << 17, "static": 1 << 15},
@@ -115,72 +104,6 @@ def test_magnitudes_reject_other_orders(given: object) -> None:
     with pytest.raises(ValueError, match=r"must (be|have) "):
         FALSE_MAGS.take(given)
     assert FALSE_MAGS.take("5,5") == (5.0, 5.0)
-
-
-# --- campaigns ------------------------------------------------------------------------------------
-
-
-@pytest.mark.usefixtures("failing")
-def test_report_has_the_sections_of_the_experiment(
-    plan: CampaignPlan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    pytest.importorskip("matplotlib")
-    folder = Folder.begun(tmp_path / "c", plan, resume=False)
-    list(run(folder, 1))
-    seen = list[Any]()
-
-    class Tested:
-        marks = ()
-
-        def sections(self, results: Iterator[Any]) -> Iterator[Section]:
-            seen.extend(results)
-            yield Section("by part & kind", ("part", "how often"), [("a<b", "7"), ("c", "9")])
-            yield Section("as a figure", png=b"\x89PNG figure")
-
-    monkeypatch.setattr(report, "experiment_of", lambda *_of: Tested())
-    page, *figures = report.write(folder)
-    text = page.read_text("utf-8")
-    assert "<h2>by part &amp; kind</h2>" in text
-    assert "<tr><th>part</th><th>how often</th></tr>" in text
-    assert "<tr><td>a&lt;b</td><td>7</td></tr>\n<tr><td>c</td><td>9</td></tr>" in text
-    assert figures[-1].name == "as-a-figure.png"
-    assert figures[-1].read_bytes() == b"\x89PNG figure"
-    assert 'alt="as-a-figure.png"' in text
-    assert len(seen) == len(list(folder.rows()))
-
-
-def test_worst_case_has_the_largest_error(
-    plan: CampaignPlan, tmp_path: Path, failing: set[float], monkeypatch: pytest.MonkeyPatch
-) -> None:
-
-    failing.add(0.9)
-    folder = Folder.begun(tmp_path / "c", plan, resume=False)
-    rows = [
-        replace(row, outcome="right", result={"error_deg": error, "other": 99.0})
-        for row, error in zip(run(folder, 1), (0.5, -3.0, None, 1.0, 2.0), strict=False)
-    ]
-    monkeypatch.setattr(Folder, "rows", lambda _folder: iter(rows))
-    monkeypatch.setattr(module, "_picture", lambda *_of: b"")
-    cases = list(worst(folder, 4))
-    assert [case.number for case in cases] == [1, 4, 3, 0]
-    assert "error_deg 3" in cases[0].text
-    assert "other" not in cases[0].text
-    assert "false_stars = 0" in cases[0].text
-
-
-def test_worst_replays_failures_and_raises_new_ones(
-    plan: CampaignPlan, tmp_path: Path, failing: set[float]
-) -> None:
-    failing.add(0.5)
-    folder = Folder.begun(tmp_path / "c", plan, resume=False)
-    rows = list(run(folder, 1))
-    assert {"failed"} < {row.outcome for row in rows}
-    (case,) = worst(folder, 1)
-    assert case.text.startswith("failed; IndexError: drawn")
-    assert case.jpeg == b""
-    failing.add(-1.0)  # now all of them fail
-    with pytest.raises(IndexError):
-        list(worst(folder, len(rows)))
 
 
 # --- the ball -------------------------------------------------------------------------------------

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 from cubestack.host.devices.experiment import Result
 from cubestack.host.studies.campaign import block
+from cubestack.host.studies.campaign.folder import Folder
 from cubestack.host.studies.campaign.plan import CampaignPlan
 
 
@@ -54,3 +56,9 @@ def failing(monkeypatch: pytest.MonkeyPatch) -> set[float]:
 def plan() -> CampaignPlan:
     """Two points of seven frames, in blocks of three."""
     return CampaignPlan(device="cubestar", frames=7, seed=5, block=3, grid={"false_stars": [0, 9]})
+
+
+@pytest.fixture
+def folder(tmp_path: Path, plan: CampaignPlan) -> Folder:
+    """An empty folder with that plan."""
+    return Folder.begun(tmp_path / "c", plan, resume=False)

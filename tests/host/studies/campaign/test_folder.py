@@ -23,8 +23,7 @@ def rows(block: int, count: int = 3) -> list[Row]:
     return [Row(block, row, 1, row, {}, "right", "", {"x": 0.1}) for row in range(count)]
 
 
-def test_rows_are_read_as_written_and_sorted(tmp_path: Path, plan: CampaignPlan) -> None:
-    folder = Folder.begun(tmp_path / "c", plan, resume=False)
+def test_rows_are_read_as_written_and_sorted(folder: Folder, tmp_path: Path) -> None:
     folder.add(rows(1))
     folder.add(rows(0))
     assert list(Folder(tmp_path / "c").rows()) == rows(1) + rows(0)
@@ -33,8 +32,7 @@ def test_rows_are_read_as_written_and_sorted(tmp_path: Path, plan: CampaignPlan)
 
 
 @pytest.mark.parametrize("cut", range(1, 200, 13))
-def test_repair_removes_only_a_torn_block(tmp_path: Path, plan: CampaignPlan, cut: int) -> None:
-    folder = Folder.begun(tmp_path / "c", plan, resume=False)
+def test_repair_removes_only_a_torn_block(folder: Folder, tmp_path: Path, cut: int) -> None:
     folder.add(rows(2))
     folder.add(rows(1))
     path = tmp_path / "c" / ROWS
@@ -82,8 +80,7 @@ def test_rejects_a_folder_with_other_files(tmp_path: Path, plan: CampaignPlan) -
         Folder.begun(tmp_path, plan, resume=True)
 
 
-def test_campaign_is_locked_by_one_process(tmp_path: Path, plan: CampaignPlan) -> None:
-    folder = Folder.begun(tmp_path / "c", plan, resume=False)
+def test_campaign_is_locked_by_one_process(folder: Folder, tmp_path: Path) -> None:
     with (
         folder.alone(),
         pytest.raises(FolderError, match="another process works on this campaign"),
@@ -92,10 +89,7 @@ def test_campaign_is_locked_by_one_process(tmp_path: Path, plan: CampaignPlan) -
         pass
 
 
-def test_full_disk_names_the_file(
-    tmp_path: Path, plan: CampaignPlan, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    folder = Folder.begun(tmp_path / "c", plan, resume=False)
+def test_full_disk_names_the_file(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
     folder.add(rows(0))
 
     def full(_fileno: int) -> Any:
@@ -107,9 +101,8 @@ def test_full_disk_names_the_file(
     assert list(folder.rows())[:3] == rows(0)
 
 
-def test_each_value_has_a_column(failing: set[float], plan: CampaignPlan, tmp_path: Path) -> None:
+def test_each_value_has_a_column(folder: Folder, failing: set[float]) -> None:
     failing.add(0.9)
-    folder = Folder.begun(tmp_path / "c", plan, resume=False)
     rows = list(run(folder, 1))
     assert {row.outcome for row in rows} > {"failed", "right"}
     found = pyarrow.parquet.read_table(write_parquet(folder)).to_pylist()
@@ -122,8 +115,7 @@ def test_each_value_has_a_column(failing: set[float], plan: CampaignPlan, tmp_pa
     assert {one["swept.false_stars"] for one in found} == {0, 9}
 
 
-def test_rejects_a_campaign_without_rows(plan: CampaignPlan, tmp_path: Path) -> None:
-    folder = Folder.begun(tmp_path / "c", plan, resume=False)
+def test_rejects_a_campaign_without_rows(folder: Folder) -> None:
     with pytest.raises(ValueError, match="has no rows yet"):
         write_parquet(folder)
     assert not (folder.path / PARQUET_FILE).exists()

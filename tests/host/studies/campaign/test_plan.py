@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cubestack.host.cli.main import main
 from cubestack.host.studies.campaign.plan import CampaignPlan, known_plans, plan_file, summary
+from tests.conftest import Run
 
 PAGE = Path(__file__).parents[4] / "docs" / "how-to" / "campaigns.md"
 
@@ -141,22 +141,18 @@ PLAN_TEXT = 'device = "cubestar"\nframes = 2\nseed = 4\nblock = 1\n[grid]\nfalse
 
 
 def test_run_resume_report_and_replay(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, run: Run
 ) -> None:
     monkeypatch.chdir(tmp_path)
     Path("false.toml").write_text(PLAN_TEXT, "utf-8")
-    assert main(["campaign", "false.toml", "--workers", "1", "--json"]) == 0
-    points = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    lines = run("campaign", "false.toml", "--workers", "1", "--json").out.splitlines()
+    points = [json.loads(line) for line in lines]
     assert [point["point"] for point in points] == [{"false_stars": 0}, {"false_stars": 10}]
     assert [point["of"] for point in points] == [2, 2]
-    assert main(["campaign", "false.toml"]) == 2
-    assert "--resume continues it" in capsys.readouterr().err
-    assert main(["campaign", "false.toml", "--resume", "--workers", "1"]) == 0
-    assert "right" in capsys.readouterr().out
-    report = ["report", "false.campaign", "--compare", "false.campaign", "--worst", "1"]
-    assert main(["campaign", *report]) == 0
-    assert "wrote false.campaign/report.html and 4 figures" in capsys.readouterr().err
+    assert "--resume continues it" in run("campaign", "false.toml").line
+    assert "right" in run("campaign", "false.toml", "--resume", "--workers", "1").out
+    report = ("report", "false.campaign", "--compare", "false.campaign", "--worst", "1")
+    assert "wrote false.campaign/report.html and 4 figures" in run("campaign", *report).err
     rows = Path("false.campaign/rows.jsonl").read_text("utf-8").splitlines()
-    assert main(["campaign", "replay", "false.campaign", "3"]) == 0
-    again = json.loads(capsys.readouterr().out)
+    again = json.loads(run("campaign", "replay", "false.campaign", "3").out)
     assert again.items() >= json.loads(rows[3])["result"].items()

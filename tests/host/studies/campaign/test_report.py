@@ -1,6 +1,7 @@
 import re
 from base64 import b64decode
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from html.parser import HTMLParser
 from io import BytesIO
 from pathlib import Path
@@ -10,6 +11,7 @@ import pytest
 from PIL import Image
 from scipy.stats import binomtest
 
+from cubestack.host.devices.experiment import Section
 from cubestack.host.studies.campaign import report
 from cubestack.host.studies.campaign.block import Row
 from cubestack.host.studies.campaign.folder import Folder, FolderError, run
@@ -169,16 +171,13 @@ def test_report_page_shows_the_comparison(make: Make) -> None:
     assert f"Compared with {before.path}" in cells
 
 
-def test_report_rejects_a_campaign_without_rows(plan: CampaignPlan, tmp_path: Path) -> None:
+def test_report_rejects_a_campaign_without_rows(folder: Folder) -> None:
     with pytest.raises(ValueError, match="has no rows yet"):
-        report.write(Folder.begun(tmp_path / "c", plan, resume=False))
+        report.write(folder)
 
 
-def test_worst_cases_are_sorted_by_outcome(
-    tmp_path: Path, plan: CampaignPlan, failing: set[float]
-) -> None:
+def test_worst_cases_are_sorted_by_outcome(folder: Folder, failing: set[float]) -> None:
     failing.add(0.9)
-    folder = Folder.begun(tmp_path / "c", plan, resume=False)
     rows = list(run(folder, 1))
     cases = list(worst(folder, len(rows)))
     outcomes = [list(folder.rows())[case.number].outcome for case in cases]
@@ -187,6 +186,63 @@ def test_worst_cases_are_sorted_by_outcome(
     assert {"failed", "right"} <= set(outcomes)
     assert all(case.text.startswith(outcome) for case, outcome in zip(cases, outcomes, strict=True))
     assert not any(case.jpeg for case in cases)  # nothing was powered up
+
+
+@pytest.mark.usefixtures("failing")
+def test_report_has_the_sections_of_the_experiment(
+    folder: Folder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("matplotlib")
+    list(run(folder, 1))
+    seen = list[Any]()
+
+    class Tested:
+        marks = ()
+
+        def sections(self, results: Iterator[Any]) -> Iterator[Section]:
+            seen.extend(results)
+            yield Section("by part & kind", ("part", "how often"), [("a<b", "7"), ("c", "9")])
+            yield Section("as a figure", png=b"\x89PNG figure")
+
+    monkeypatch.setattr(report, "experiment_of", lambda *_of: Tested())
+    page, *figures = report.write(folder)
+    text = page.read_text("utf-8")
+    assert "<h2>by part &amp; kind</h2>" in text
+    assert "<tr><th>part</th><th>how often</th></tr>" in text
+    assert "<tr><td>a&lt;b</td><td>7</td></tr>\n<tr><td>c</td><td>9</td></tr>" in text
+    assert figures[-1].name == "as-a-figure.png"
+    assert figures[-1].read_bytes() == b"\x89PNG figure"
+    assert 'alt="as-a-figure.png"' in text
+    assert len(seen) == len(list(folder.rows()))
+
+
+def test_worst_case_has_the_largest_error(
+    folder: Folder, failing: set[float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    failing.add(0.9)
+    rows = [
+        replace(row, outcome="right", result={"error_deg": error, "other": 99.0})
+        for row, error in zip(run(folder, 1), (0.5, -3.0, None, 1.0, 2.0), strict=False)
+    ]
+    monkeypatch.setattr(Folder, "rows", lambda _folder: iter(rows))
+    monkeypatch.setattr("cubestack.host.studies.campaign.worst._picture", lambda *_of: b"")
+    cases = list(worst(folder, 4))
+    assert [case.number for case in cases] == [1, 4, 3, 0]
+    assert "error_deg 3" in cases[0].text
+    assert "other" not in cases[0].text
+    assert "false_stars = 0" in cases[0].text
+
+
+def test_worst_replays_failures_and_raises_new_ones(folder: Folder, failing: set[float]) -> None:
+    failing.add(0.5)
+    rows = list(run(folder, 1))
+    assert {"failed"} < {row.outcome for row in rows}
+    (case,) = worst(folder, 1)
+    assert case.text.startswith("failed; IndexError: drawn")
+    assert case.jpeg == b""
+    failing.add(-1.0)  # now all of them fail
+    with pytest.raises(IndexError):
+        list(worst(folder, len(rows)))
 
 
 def test_worst_case_of_a_real_device_has_its_picture(tmp_path: Path) -> None:

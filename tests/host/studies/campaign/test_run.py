@@ -95,10 +95,7 @@ def test_rates_are_counted_by_point(alone: Folder) -> None:
     assert found[(("false_stars", 0),)]["right"] == 2
 
 
-def test_resume_does_not_measure_existing_rows(
-    failing: set[float], plan: CampaignPlan, tmp_path: Path
-) -> None:
-    folder = Folder.begun(tmp_path / "c", plan, resume=False)
+def test_resume_does_not_measure_existing_rows(folder: Folder, failing: set[float]) -> None:
     rows: Iterator[object] = run(folder, 1)
     for _ in range(4):
         next(rows)
@@ -113,11 +110,8 @@ def test_resume_does_not_measure_existing_rows(
     assert ended[-3:] == ["failed"] * 3
 
 
-def test_no_rows_are_written_if_every_frame_fails(
-    failing: set[float], plan: CampaignPlan, tmp_path: Path
-) -> None:
+def test_no_rows_are_written_if_every_frame_fails(folder: Folder, failing: set[float]) -> None:
     failing.add(-1.0)
-    folder = Folder.begun(tmp_path / "c", plan, resume=False)
     with pytest.raises(RuntimeError, match="nothing can be measured: IndexError: drawn"):
         list(run(folder, 1))
     assert (folder.path / PLAN).is_file()

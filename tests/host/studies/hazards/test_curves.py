@@ -6,12 +6,13 @@ import pytest
 from PIL import Image
 from scipy.stats import binomtest
 
-from cubestack.host.cli.main import main
 from cubestack.host.devices.registry import device
 from cubestack.host.experiments.hazard_options import known
 from cubestack.host.experiments.rates import wilson
 from cubestack.host.studies.hazards.album import PAGE, PICTURES
-from cubestack.host.studies.hazards.curves import Job, devices_with_hazards, hazards_of, run
+from cubestack.host.studies.hazards.curves import Job, devices_with_hazards, hazards_of
+from cubestack.host.studies.hazards.curves import run as run_jobs
+from tests.conftest import Run
 
 
 @pytest.mark.parametrize(("count", "of"), [(0, 20), (1, 20), (13, 40), (20, 20), (3, 1000)])
@@ -33,21 +34,21 @@ def test_only_cubesense_has_hazards_of_the_earth() -> None:
 
 
 def test_each_camera_has_a_picture_per_frame() -> None:
-    (point,) = run([Job("cubesense", "extended", "terminator", 0.0, 2, 4)], 1)
+    (point,) = run_jobs([Job("cubesense", "extended", "terminator", 0.0, 2, 4)], 1)
     assert (point.pictures, point.right) == (4, 4)
 
 
 def test_points_do_not_depend_on_the_number_of_workers() -> None:
     jobs = [Job("cubestar", "extended", "gradient", strength, 2, 4) for strength in (0.0, 60.0)]
-    alone = list(run(jobs, 1))
-    assert alone == list(run(jobs, 2))
+    alone = list(run_jobs(jobs, 1))
+    assert alone == list(run_jobs(jobs, 2))
     assert [point.strength for point in alone] == [0.0, 60.0]
     assert all(point.right + point.refused + point.wrong == 2 for point in alone)
     assert alone[0].right == 2
 
 
 def test_dark_sky_is_refused_with_a_reason() -> None:
-    (point,) = run([Job("cubestar", "extended", "defocus", 6.0, 2, 4)], 1)
+    (point,) = run_jobs([Job("cubestar", "extended", "defocus", 6.0, 2, 4)], 1)
     assert point.wrong == 0
     assert sum(point.reasons.values()) == point.refused
 
@@ -81,15 +82,13 @@ def test_page_numbers_match_the_points() -> None:
         assert row in page
 
 
-def test_out_writes_pictures_curves_and_points(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    arguments = ["--hazard", "gradient", "--frames", "1", "--workers", "1", "--out", str(tmp_path)]
-    assert main(["hazards", "cubestar", *arguments, "--json"]) == 0
-    printed = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+def test_out_writes_pictures_curves_and_points(tmp_path: Path, run: Run) -> None:
+    arguments = ("--hazard", "gradient", "--frames", "1", "--workers", "1", "--out", tmp_path)
+    lines = run("hazards", "cubestar", *arguments, "--json").out.splitlines()
+    printed = [json.loads(line) for line in lines]
     pictures = tmp_path / "images" / "hazards"
-    lines = (pictures / "points.jsonl").read_text("utf-8").splitlines()
-    assert [json.loads(line) for line in lines] == printed
+    stored = (pictures / "points.jsonl").read_text("utf-8").splitlines()
+    assert [json.loads(line) for line in stored] == printed
     assert {point["strength"] for point in printed} >= {0, 60}
     with Image.open(pictures / "gradient-cubestar.jpg") as sample:
         assert sample.size == (480, 240)
@@ -100,11 +99,11 @@ def test_out_writes_pictures_curves_and_points(
     assert "| CubeStar | 60 | " in page
 
 
-def test_rejects_a_page_without_markers_and_a_file_as_folder(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_rejects_a_page_without_markers_and_a_file_as_folder(tmp_path: Path, run: Run) -> None:
     (tmp_path / "hazards.md").write_text("mine\n", "utf-8")
-    assert main(["hazards", "cubestar", "--out", str(tmp_path)]) == 2
-    assert "hazards.md has no lines <!-- hazards -->" in capsys.readouterr().err
-    assert main(["hazards", "cubestar", "--out", str(tmp_path / "hazards.md")]) == 2
-    assert "is a file; a folder would be right" in capsys.readouterr().err
+    for out, error in (
+        (tmp_path, "hazards.md has no lines <!-- hazards -->"),
+        (tmp_path / "hazards.md", "is a file; a folder would be right"),
+    ):
+        outcome = run("hazards", "cubestar", "--out", out)
+        assert (outcome.code, error in outcome.line) == (2, True)
