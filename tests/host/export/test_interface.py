@@ -5,21 +5,22 @@ import struct
 import subprocess
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from cubestack.firmware_model.interface.aramis import INTERFACE as ARAMIS
+from cubestack.emulator.boards.cubestar.catalogue import onboard_catalogue
 from cubestack.firmware_model.interface.codec.message import Interface
 from cubestack.firmware_model.interface.codec.switches import PROFILES, Switches
 from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
 from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.host.devices.registry import device, device_names
-from cubestack.host.export.c_header import c_header
+from cubestack.host.export.c_header import c_arrays, c_header
 from cubestack.host.export.interface import FORMATS, render, render_switches
 
 from ...conftest import Run
+from .frames import EACH, INTERFACES
 
 DOCUMENTS = Path(__file__).parents[3] / "docs" / "sensors"
-DEVICES = pytest.mark.parametrize("interface", [INTERFACE, CUBESENSE, ARAMIS], ids=lambda i: i.name)
 COMPILER = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
 TIMEOUT_S = 120
 
@@ -69,22 +70,22 @@ int main(void)
 """
 
 
-def compile_and_run(folder: Path, interface: Interface, program: str, data: bytes) -> list[str]:
-    (folder / f"{interface.name.lower()}.h").write_text(c_header(interface))
+def compile_and_run(folder: Path, program: str, data: bytes = b"") -> bytes:
+    for interface in INTERFACES:
+        (folder / f"{interface.name.lower()}.h").write_text(c_header(interface))
     (folder / "main.c").write_text(program)
     flags = ["-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror"]
     command = [str(COMPILER), *flags, "main.c", "-o", "main"]
     subprocess.run(command, cwd=folder, check=True, timeout=TIMEOUT_S)
-    run = subprocess.run(
+    return subprocess.run(
         [folder / "main"], input=data, stdout=subprocess.PIPE, check=True, timeout=TIMEOUT_S
-    )
-    return run.stdout.decode().splitlines()
+    ).stdout
 
 
 @pytest.mark.skipif(COMPILER is None, reason="no C compiler")
 def test_c_header_compiles_and_agrees_with_the_tables(tmp_path: Path) -> None:
     data = bytes.fromhex("0102 f0c2 8090a0b0 0000c03f 99aabbcc")
-    first, second, copied = compile_and_run(tmp_path, INTERFACE, PROGRAM, data)
+    first, second, copied = compile_and_run(tmp_path, PROGRAM, data).decode().splitlines()
     fx = struct.unpack("<f", data[:4])[0]
     assert first.split() == [str(len(data)), f"{fx:.9g}", "-15632", str(0xB0A09080), "-1.5632"]
     assert second == "177 18 29 0"
@@ -93,11 +94,10 @@ def test_c_header_compiles_and_agrees_with_the_tables(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(COMPILER is None, reason="no C compiler")
 def test_c_header_of_a_device_with_registers_and_letters(tmp_path: Path) -> None:
-    lines = compile_and_run(tmp_path, CUBESENSE, SENSE_PROGRAM, b"")
-    assert lines == ["1234 -567 1", "1c 48 100 a 307200"]
+    assert compile_and_run(tmp_path, SENSE_PROGRAM) == b"1234 -567 1\n1c 48 100 a 307200\n"
 
 
-@DEVICES
+@EACH
 def test_c_header_defines_every_name_once_and_has_every_message(interface: Interface) -> None:
     upper = interface.name.upper()
     pattern = rf"(?:#define|^   ) ({upper}_\w+)"
@@ -110,7 +110,7 @@ def test_c_header_defines_every_name_once_and_has_every_message(interface: Inter
         assert f"{upper}_REGISTER_{register.name}" in names
 
 
-@DEVICES
+@EACH
 def test_register_page_is_up_to_date(interface: Interface) -> None:
     device = interface.name.lower()
     text = (DOCUMENTS / f"registers-{device}.md").read_text(encoding="utf-8")
@@ -120,7 +120,7 @@ def test_register_page_is_up_to_date(interface: Interface) -> None:
     )
 
 
-@DEVICES
+@EACH
 @pytest.mark.parametrize("form", ["table", "markdown", "json"])
 def test_every_format_names_every_message_and_field(interface: Interface, form: str) -> None:
     words = set(re.findall(r"\w+", render(interface, form)))
@@ -164,7 +164,7 @@ def test_listing_marks_assumed_and_extended_parts(form: str) -> None:
     assert re.search(r"\ba\b.*TAKE_NADIR.*'Y'", text)
 
 
-@DEVICES
+@EACH
 @pytest.mark.parametrize("form", FORMATS)
 def test_command_prints_every_format(interface: Interface, form: str, run: Run) -> None:
     outcome = run("registers", interface.name.lower(), "--format", form)
@@ -209,3 +209,37 @@ def test_each_format_describes_each_switch(name: str, run: Run) -> None:
 
 def test_device_without_switches() -> None:
     assert render_switches("Glow", Switches, "table") == "Glow has no switches\n"
+
+
+DUMP = """
+#include <stdio.h>
+#include "catalogue.c"
+#define PUT(array) fwrite(array, 1, sizeof array, stdout)
+int main(void)
+{
+    if (CATALOGUE_STAR_COUNT != 405 || CATALOGUE_PAIR_ANGLE_COUNT != CATALOGUE_PAIR_FIRST_COUNT)
+        return 1;
+    PUT(catalogue_star), PUT(catalogue_star_x), PUT(catalogue_star_y), PUT(catalogue_star_z);
+    PUT(catalogue_pair_first), PUT(catalogue_pair_second), PUT(catalogue_pair_angle);
+    return 0;
+}
+"""
+
+
+@pytest.mark.skipif(COMPILER is None, reason="no C compiler")
+def test_compiled_arrays_equal_the_onboard_catalogue(run: Run, tmp_path: Path) -> None:
+    catalogue = tmp_path / "catalogue.c"
+    code, _, err = run("catalogue", "cubestar", "--pair-limit", "42.1", "--c", str(catalogue))
+    assert (code, err) == (0, "")
+    found = compile_and_run(tmp_path, DUMP)
+    assert found == onboard_catalogue(pair_limit_deg=42.1).to_bytes()
+    assert catalogue.read_text().count("const ") == 7
+
+
+def test_rejects_other_arrays_and_unwritable_files(run: Run) -> None:
+    for array, wrong in ((np.zeros(3), " of u2, i2, u4, f4, not float64"), (np.eye(2), "")):
+        with pytest.raises(ValueError, match=f"x must be one row{wrong}"):
+            c_arrays("p", {"x": array}, "about")
+    code, _, err = run("catalogue", "cubestar", "--c", "/no/such/folder/x.c")
+    assert code == 2
+    assert "can not write /no/such/folder/x.c" in err

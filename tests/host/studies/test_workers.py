@@ -1,13 +1,13 @@
 import os
 import signal
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from cubestack.host.studies.workers import AHEAD, WorkersError, performed
-
-from .cluster import dask_cluster
 
 
 def square(number: int) -> int:
@@ -34,6 +34,16 @@ def die_once(job: tuple[Path, int]) -> int:
 
 def fail(number: int) -> int:
     raise ValueError(f"not {number}")
+
+
+@contextmanager
+def dask_cluster(workers: int = 2) -> Iterator[Any]:
+    """Scheduler and worker processes on loopback; skips the test without Dask."""
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(
+        n_workers=workers, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0"
+    ) as cluster:
+        yield cluster
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,7 @@ from cubestack.host.studies.campaign.folder import PLAN, ROWS, Folder, count, re
 from cubestack.host.studies.campaign.plan import CampaignPlan, FrameBlock
 from cubestack.host.studies.campaign.statistics import rates
 
-from ..cluster import dask_cluster
+from ..test_workers import dask_cluster
 
 TEXT = 'device = "cubestar"\nframes = 2\nseed = 4\nblock = 1\n[grid]\nfalse_stars = [0, 10]\n'
 

@@ -4,10 +4,12 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from amaranth.hdl import Cat, Module, Signal
 
 from cubestack.emulator.boards.cubestar import stack
 from cubestack.emulator.native.compiler import find_compiler
 from cubestack.hdl.blocks import frames
+from cubestack.hdl.blocks.counters import MatrixCounter
 from cubestack.host.devices.registry import device
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.studies.cubesense import upsets as cubesense
@@ -16,8 +18,6 @@ from cubestack.host.studies.cubestar.upsets import _state
 from cubestack.host.studies.upsets import experiment
 from cubestack.host.studies.upsets.sample import UpsetResult
 from tests.tiers import quick
-
-from .voted import VotedCounter
 
 STORES = ("storing", "between")
 
@@ -72,6 +72,33 @@ def test_same_seed_gives_the_same_results() -> None:
     stored = [result.effect for result in first if result.phase == "storing"]
     assert set(stored) <= {"nothing", "pixel", "timing"}
     assert "pixel" in stored
+
+
+class VotedCounter(MatrixCounter):
+    """Three counters that continue from the majority: an upset of one is outvoted."""
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        column, row = (Signal(range(size)) for size in (self._columns, self._rows))
+        m.d.comb += [
+            self.last_column.eq(column == self._columns - 1),
+            self.last_row.eq(row == self._rows - 1),
+            self.address.eq(Cat(column, row)),
+        ]
+        row_over = self.next_row | (self.next_column & self.last_column)
+        for name, voted, clear, step in (
+            ("column", column, self.clear | row_over, self.next_column),
+            ("row", row, self.clear | (row_over & self.last_row), row_over),
+        ):
+            a, b, c = copies = [Signal(len(voted), name=f"{name}_{copy}") for copy in "abc"]
+            m.d.comb += voted.eq((a & b) | (b & c) | (a & c))
+            for one in copies:
+                m.d[self._domain] += one.eq(voted)
+                with m.If(clear):
+                    m.d[self._domain] += one.eq(0)
+                with m.Elif(step):
+                    m.d[self._domain] += one.eq(voted + 1)
+        return m
 
 
 @pytest.fixture

@@ -1,5 +1,8 @@
-from collections.abc import Sequence
+import os
+import time
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from fractions import Fraction
 from types import SimpleNamespace
 from typing import Any
 
@@ -7,7 +10,11 @@ import numpy as np
 import pytest
 
 from cubestack.emulator.sim.virtual_time import PS_PER_US, Kernel
+from cubestack.host.devices.registry import device
+from cubestack.host.experiments.measure import experiment_of
+from cubestack.host.studies.upsets.atlas import HEAD, atlas, lines, rows
 from cubestack.host.studies.upsets.clean import CleanLoop, Interval, Snapshot, take
+from cubestack.host.studies.upsets.fork import CopyError, in_copy
 from cubestack.host.studies.upsets.sample import (
     Effect,
     Outcome,
@@ -136,3 +143,147 @@ def test_loops_run_until_an_answer_is_right(
         for what, us in (("start", begin_us), ("judge", begin_us + 40))
     ]
     assert device.log == [("ram is hit", 20), ("judge", 50), *further]
+
+
+class Port:
+    """An FPGA port whose levels and time are set by the test."""
+
+    running = 2
+
+    def __init__(self) -> None:
+        self.now_ps = 100
+        self.levels = {"ACK": 0, "DONE": 0, "other": 0}
+        self.told = list[Any]()
+
+    def get_pin(self, name: str) -> int:
+        return self.levels[name]
+
+    def set_pin(self, name: str, value: int) -> None:
+        self.told.append((name, value))
+
+    def run(self, until_ps: int, stop_on: tuple[str, int] | None) -> int:
+        self.told.append((until_ps, stop_on))
+        return until_ps - 1
+
+    def attend(self, *of: int) -> int:
+        self.told.append(of)
+        return 7
+
+    def strobe_read(self, out: Any, period: Fraction, until_ps: int) -> int:
+        out[:3] = (1, 2, 3)
+        return 3
+
+    def access(self, transactions: Any, until_ps: int) -> int:
+        return 2
+
+
+def test_acknowledges_are_recorded_when_they_change() -> None:
+    port: Any = Port()
+    watch = PortWatch(port, ("ACK", "DONE"))
+    for now_ps, name, level in (
+        *((100, "ACK", 0), (200, "ACK", 1), (300, "ACK", 1), (350, "other", 1)),
+        *((400, "DONE", 1), (500, "ACK", 0), (600, "DONE", 1)),
+    ):
+        port.now_ps, port.levels[name] = now_ps, level
+        assert watch.get_pin(name) == level
+    assert watch.seen == [(200, "ACK", 1), (400, "DONE", 1), (500, "ACK", 0)]
+    watch.clear()
+    assert (watch.seen, watch.data) == ([], bytearray())
+    assert watch.get_pin("DONE") == 1
+    assert watch.seen == []  # it is as it was
+
+
+def test_received_bytes_are_kept() -> None:
+    watch = PortWatch(Port(), ())  # type: ignore[arg-type]
+    out = np.full(5, 9, np.uint8)
+    assert watch.strobe_read(out, Fraction(1), 10) == 3
+    data = np.array([4, 5, 6], np.uint8)
+    read: Any = SimpleNamespace(write=False, data=data)
+    written: Any = SimpleNamespace(write=True, data=data)
+    assert watch.access(written, 10) == watch.access(read, 10) == 2
+    assert bytes(watch.data) == bytes([1, 2, 3, 4, 5])
+
+
+def test_other_calls_are_passed_on() -> None:
+    port: Any = Port()
+    watch = PortWatch(port, ("ACK",))
+    watch.set_pin("READ", 1)
+    assert watch.run(50, ("ACK", 1)) == 49
+    assert watch.attend(1, 2, 3, 4) == 7
+    assert port.told == [("READ", 1), (50, ("ACK", 1)), (1, 2, 3, 4)]
+    assert (watch.now_ps, watch.running, watch.driver) == (100, 2, None)
+
+
+def test_copy_returns_its_result_and_leaves_this_process_unchanged() -> None:
+    here = [1]
+
+    def act() -> tuple[int, list[int]]:
+        here.append(2)
+        return os.getpid(), here
+
+    process, there = in_copy(act)
+    assert process != os.getpid()
+    assert (there, here) == ([1, 2], [1])
+
+
+def test_large_results_are_returned() -> None:
+    assert in_copy(lambda: bytes(3_000_000)) == bytes(3_000_000)
+
+
+@pytest.mark.parametrize(
+    ("act", "message"), [(lambda: 1 // 0, "ZeroDivisionError: "), (lambda: os._exit(3), "died")]
+)
+def test_error_and_death_of_the_copy_are_raised(act: Callable[[], int], message: str) -> None:
+    with pytest.raises(CopyError, match=message):
+        in_copy(act)
+
+
+def test_hanging_copy_times_out() -> None:
+    with pytest.raises(CopyError, match=r"no end after 0.1 s"):
+        in_copy(lambda: time.sleep(600), limit_s=0.1)
+
+
+RIGHT = UpsetResult(
+    *("writer$3.row", 0, False, "storing", 1.0, "nothing", "right", "", 0),
+    *({"idle": 0.75, "storing": 0.25}, 1.0, 9, 2.0),
+)
+PICTURE = replace(RIGHT, effect="picture", bit=1)
+WRONG = replace(PICTURE, answer="wrong", recovered=1)
+IDLE = replace(RIGHT, phase="idle")
+
+
+def test_atlas_merges_numbered_names_and_counts_effects() -> None:
+    (part,) = atlas([RIGHT, PICTURE, WRONG, IDLE])
+    assert part.name == "writer.row"
+    assert (part.effects["picture"], part.effects["nothing"], part.answers["wrong"]) == (2, 2, 1)
+    assert (part.seen, part.healed) == (2, (1, 1))
+
+
+def test_rate_weights_phases_by_duration() -> None:
+    (part,) = atlas([RIGHT, PICTURE, WRONG, IDLE])
+    # Of what is stored in a quarter of the second two upsets of three are seen, of 9 bits.
+    assert part.a_day == pytest.approx(2.0 * 9 * 0.25 * 2 / 3)
+    (idle,) = atlas([replace(PICTURE, phase="idle")])
+    assert idle.a_day == pytest.approx(2.0 * 9 * 0.75)
+
+
+def test_left_over_state_is_seen_only_with_a_bad_answer() -> None:
+    left = replace(RIGHT, effect="left over")
+    assert atlas([left])[0].seen == 0
+    assert atlas([replace(left, answer="refused")])[0].seen == 1
+
+
+def test_table_has_all_parts_and_their_sum() -> None:
+    results = [RIGHT, WRONG, replace(WRONG, target="bank", bits=1)]
+    table = list(rows(atlas(results)))
+    assert [len(row) for row in table] == [len(HEAD)] * 3
+    assert [row[0] for row in table] == ["bank", "writer.row", "all"]
+    assert float(table[-1][-1]) == pytest.approx(sum(float(row[-1]) for row in table[:-1]), rel=0.1)
+    assert any("writer.row" in line and "1 picture" in line for line in lines(results))
+
+
+def test_report_has_table_and_figure() -> None:
+    tested = experiment_of(device("cubestar"), "upsets")
+    table, figure = tested.sections(map(vars, [RIGHT, WRONG]))
+    assert list(table.head) == list(HEAD)
+    assert figure.png.startswith(b"\x89PNG")
