@@ -9,13 +9,13 @@ from typing import ClassVar, Protocol, TypedDict
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.emulator.boards.insight import Insight
+from cubestack.emulator.boards.firmware import Insight
 from cubestack.emulator.bus.i2c import Forwarder, I2cBus, I2cTarget
 from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.faults.injector import Faults
 from cubestack.emulator.faults.sites import Sites
 from cubestack.emulator.i2cdev.direct import DirectI2c
-from cubestack.emulator.ports.direct import DirectSerial
+from cubestack.emulator.ports.line import DirectSerial
 from cubestack.emulator.rtl.contract import RtlEngine
 from cubestack.emulator.sim.microcontroller import Microcontroller
 from cubestack.emulator.sim.power import PowerModel, PowerTable

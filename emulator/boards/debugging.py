@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
-from cubestack.emulator.boards.insight import Insight
+from cubestack.emulator.boards.firmware import Insight
 from cubestack.emulator.boards.monitor import FirmwareBoard, Monitor
 from cubestack.emulator.camera.common.register_file import RegisterFile
 from cubestack.emulator.iss.gdb.target import MemoryRegion

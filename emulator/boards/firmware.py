@@ -1,18 +1,23 @@
-"""Connects a machine's serial units and I2C buses to a board's, for a user's own firmware.
+"""A user's own firmware on a board: the wires of the machine's units, and its analysis.
 
-The machine models the peripherals with their registers; this module has the wires.
+The machine models the peripherals with their registers; this module connects its serial units and
+I2C buses to the board's.
 """
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 from cubestack.emulator.bus.line_format import FASTEST_BAUD, LineFormat, Parity
 from cubestack.emulator.bus.uart import Uart, UartTap
-from cubestack.emulator.camera.common.star_sensor import StarSensor
+from cubestack.emulator.camera.common.image_sensor import StarSensor
+from cubestack.emulator.iss.insight.observer import History, Observer
+from cubestack.emulator.iss.insight.symbols import Symbols
 from cubestack.emulator.iss.machine import REGISTERS, Machine
 from cubestack.emulator.iss.outcome import Outgoing, OutgoingKind
 from cubestack.emulator.sim.firmware_processor import FirmwareProcessor
 from cubestack.emulator.sim.virtual_time import PS_PER_S
+from cubestack.firmware_model.interface.efm32gg import LAYOUTS
 from cubestack.firmware_model.interface.efm32gg.serial import LEUART, USART
 
 BY_PIN = 0x100
@@ -200,3 +205,39 @@ class CameraWire:
         if self._written is not None:
             self.camera.i2c_write(self._address, bytes(self._written), now_ps)
             self._written = None
+
+
+class Insight:
+    """Profile, coverage and history of a loaded machine.
+
+    It is observed from the first use on; until then it runs at full speed.
+    """
+
+    def __init__(self, machine: Machine) -> None:
+        self.machine = machine
+        self._observed = False
+
+    @cached_property
+    def symbols(self) -> Symbols:
+        return Symbols.of(self.machine.image)
+
+    @cached_property
+    def observer(self) -> Observer:
+        """Counts cycles, executions and calls."""
+        self._observed = True
+        return Observer(self.machine, self.symbols)
+
+    @cached_property
+    def history(self) -> History:
+        """Records each function and exception; the caller must call ``take`` regularly."""
+        interrupts = {
+            number: name
+            for layout in LAYOUTS
+            for instance in layout.instances
+            for name, number in instance.interrupts.items()
+        }
+        return History(self.observer, interrupts)
+
+    def close(self) -> None:
+        if self._observed:
+            self.observer.close()

@@ -1,4 +1,7 @@
-"""Faults of parts: cameras, memories, the FPGA's registers, supplies, processors."""
+"""Faults of parts: cameras, memories, the FPGA's registers, supplies, processors.
+
+In memory, radiation inverts bits, each with the same probability.
+"""
 
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
@@ -13,7 +16,6 @@ from cubestack.emulator.faults.declaration import FaultError
 from cubestack.emulator.faults.injection import Injection, Mechanism, Report, active
 from cubestack.emulator.faults.pins import PinFaults
 from cubestack.emulator.faults.pixels import FaultySource
-from cubestack.emulator.faults.seu import flip_bit
 from cubestack.emulator.faults.sites import CameraSite, CoreSite
 from cubestack.emulator.rtl.contract import RtlEngine
 from cubestack.emulator.sim.power import PowerModel
@@ -268,3 +270,19 @@ class ProcessorFaults(Mechanism):
     def begin(self, injection: Injection) -> None:
         self.report(self.env.now, injection, "resets the processor")
         self.reset()
+
+
+def flip_bits(memory: NDArray[np.uint8], rate: float, generator: np.random.Generator) -> int:
+    """Invert each bit of ``memory`` with probability ``rate``, 0..1; return their number."""
+    if not 0 <= rate <= 1:
+        raise ValueError(f"the rate of bit flips must be 0 to 1 per bit, not {rate:g}")
+    bits = 8 * memory.size
+    count = int(generator.binomial(bits, rate))
+    for place in generator.choice(bits, count, replace=False, shuffle=False):
+        flip_bit(memory, int(place))
+    return count
+
+
+def flip_bit(memory: NDArray[np.uint8], place: int) -> None:
+    """Invert bit ``place``, counted from the lowest bit of the first byte."""
+    memory[place // 8] ^= np.uint8(1 << place % 8)

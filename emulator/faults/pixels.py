@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.emulator.camera.common.stream import StreamSegment
+from cubestack.emulator.camera.common.image_sensor import StreamSegment
 from cubestack.emulator.faults import table
 from cubestack.emulator.faults.injection import Injection, Report, active
 from cubestack.emulator.rtl.pixel_clock import PixelSegment, PixelSource

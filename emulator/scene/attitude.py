@@ -123,3 +123,22 @@ def random_quaternion(generator: np.random.Generator) -> NDArray[np.float64]:
     """A uniformly random attitude (4,), scalar part not negative."""
     q = unit_quaternion(generator.standard_normal(4))
     return -q if q[3] < 0 else q
+
+
+# Alpha and beta are undistorted image coordinates in degrees, x (right) and y (down), as sun and
+# nadir sensors report them: their root sum of squares is the angle from the boresight.
+
+
+def vector_from_angles(alpha_deg: ArrayLike, beta_deg: ArrayLike) -> NDArray[np.float64]:
+    """Unit vectors (..., 3) in camera axes of directions (alpha, beta)."""
+    theta, phi = np.radians(np.hypot(alpha_deg, beta_deg)), np.arctan2(beta_deg, alpha_deg)
+    return np.stack(
+        [np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1
+    )
+
+
+def angles_from_vector(vector: ArrayLike) -> tuple[float, float]:
+    """Alpha and beta of a direction (3,) in camera axes, of any length."""
+    x, y, z = np.asarray(vector, np.float64)
+    theta, phi = np.degrees(np.arctan2(np.hypot(x, y), z)), np.arctan2(y, x)
+    return float(theta * np.cos(phi)), float(theta * np.sin(phi))

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from cubestack.emulator.scene.angles import vector_from_angles
+from cubestack.emulator.scene.attitude import vector_from_angles
 from cubestack.emulator.scene.earth import EARTH_RADIUS_KM
 from cubestack.emulator.scene.earth_sun import EarthSunScene
 from cubestack.emulator.scene.file import SceneError

@@ -2,7 +2,7 @@
 
 CubeSense thesis, sections 5.1.3.2 and 5.5. Directions are unit vectors in *scene axes*, which are
 the satellite's body axes at time 0. The mounting of a camera gives the directions of its boresight
-and of its picture's right side in body axes. Alpha and beta are as in ``emulator.scene.angles``.
+and of its picture's right side in body axes. Alpha and beta are as in ``emulator.scene.attitude``.
 """
 
 from dataclasses import dataclass, field
@@ -12,8 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cubestack.emulator.scene.angles import angles_from_vector, vector_from_angles
-from cubestack.emulator.scene.attitude import matrix_from_quaternion, propagate
+from cubestack.emulator.scene.attitude import (
+    angles_from_vector,
+    matrix_from_quaternion,
+    propagate,
+    vector_from_angles,
+)
 from cubestack.emulator.scene.earth import Earth, angular_radius_deg
 from cubestack.emulator.scene.file import SceneError
 from cubestack.emulator.scene.hazards.contract import SkyHazard, check_hazards

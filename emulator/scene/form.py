@@ -4,14 +4,16 @@ places of cameras and bodies on a map of the sky.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
-from typing import Any, Generic, TypeVar
+from pathlib import Path
+from typing import Any, ClassVar, Generic, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.emulator.scene.file import SceneError, read_scene_file
 from cubestack.emulator.scene.hazards.contract import Body, SkyHazard
 from cubestack.emulator.scene.hazards.hazard import Hazard
-from cubestack.firmware_model.values import plain
+from cubestack.firmware_model.values import DeclaredValues, described, plain, read_table
 
 Matrix = NDArray[np.float64]
 Table = dict[str, Any]
@@ -129,3 +131,40 @@ def bodies_of(hazards: tuple[SkyHazard, ...]) -> tuple[Body, ...]:
         for body in hazard.bodies:
             found.setdefault((body.name, tuple(round_values(body.direction))), body)
     return tuple(found.values())
+
+
+@dataclass(frozen=True)
+class DeclaredScene(DeclaredValues):
+    """Base of frozen dataclasses whose fields are declared values, each a key of scene files.
+
+    Attributes:
+        kind: value of the key ``kind`` in their files.
+    """
+
+    kind: ClassVar[str]
+    error = SceneError
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        if not hasattr(cls, "kind"):
+            raise SceneError(f"{cls.__name__} has no kind: what scene files have as `kind`")
+
+    @classmethod
+    def load(cls, path: Path) -> Self:
+        """Read a scene file; SceneError names the wrong key."""
+        kinds = {cls.kind: lambda table: cls(**read_table(table, cls.declared()))}
+        return read_scene_file(path, kinds, f'"{cls.kind}"')
+
+    def sky_map(self, now_ps: int) -> SkyMap:
+        """Its map of the sky at a time in ps; by default empty."""
+        return SkyMap("no map", ())
+
+    @classmethod
+    def form(cls) -> SceneForm[Self]:
+        return SceneForm(
+            {cls.kind: described(cls.declared())}, lambda board: board.scene, _table, cls.sky_map
+        )
+
+
+def _table(scene: DeclaredScene) -> dict[str, Any]:
+    return {"kind": scene.kind} | changed_fields(scene, type(scene)())

@@ -60,9 +60,9 @@ if TYPE_CHECKING:
     from cubestack.firmware_model.node.program import Source as Source
 
     "Scene"
-    from cubestack.emulator.scene.declared import DeclaredScene as DeclaredScene
     from cubestack.emulator.scene.file import SceneError as SceneError
     from cubestack.emulator.scene.form import CameraField as CameraField
+    from cubestack.emulator.scene.form import DeclaredScene as DeclaredScene
     from cubestack.emulator.scene.form import SkyMap as SkyMap
     from cubestack.emulator.scene.hazards.contract import SUN_RADIUS_DEG as SUN_RADIUS_DEG
     from cubestack.emulator.scene.hazards.contract import Body as Body
@@ -98,8 +98,8 @@ if TYPE_CHECKING:
     from cubestack.host.devices.node_device import node_device as node_device
 
     "FPGA and camera"
-    from cubestack.emulator.camera.common.stream import PixelClock as PixelClock
-    from cubestack.emulator.camera.common.stream import StreamSegment as StreamSegment
+    from cubestack.emulator.camera.common.image_sensor import PixelClock as PixelClock
+    from cubestack.emulator.camera.common.image_sensor import StreamSegment as StreamSegment
     from cubestack.emulator.rtl.contract import RtlEngine as RtlEngine
     from cubestack.emulator.rtl.wiring import CameraPins as CameraPins
     from cubestack.emulator.rtl.wiring import Level as Level

@@ -27,7 +27,7 @@ from cubestack.emulator.i2cdev.adapter import I2cAdapter
 from cubestack.emulator.i2cdev.scheduler import open_scheduler
 from cubestack.emulator.i2cdev.server import I2cServer
 from cubestack.emulator.ports.control import ControlPort
-from cubestack.emulator.ports.lifeline import Lifeline
+from cubestack.emulator.ports.endpoint import Lifeline
 from cubestack.emulator.ports.serial_port import SerialPort
 from cubestack.emulator.scene.orbit_file import load_orbit
 from cubestack.firmware_model.formats.linux_i2c import socket_path

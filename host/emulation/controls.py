@@ -128,7 +128,7 @@ class EmulatedControls:
 
         Raises ValueError for an unknown name.
         """
-        from cubestack.emulator.boards.processor_registers import peek
+        from cubestack.emulator.boards.monitor import peek
 
         insight = self._board.insight
         if insight is None:

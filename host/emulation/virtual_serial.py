@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from cubestack.host.clients.contract import Closable
 
 if TYPE_CHECKING:
-    from cubestack.emulator.ports.direct import DirectSerial
+    from cubestack.emulator.ports.line import DirectSerial
 
 PS_PER_S = 10**12
 

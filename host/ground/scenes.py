@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from cubestack.emulator.scene.file import toml_text
 from cubestack.emulator.scene.form import SceneForm
 from cubestack.emulator.scene.hipparcos import load_sky
 from cubestack.emulator.scene.sky import EPOCHS
-from cubestack.emulator.scene.toml_text import toml_text
 from cubestack.firmware_model.formats.setup import Document
 from cubestack.host.devices.device import AnyDevice
 from cubestack.host.emulation.emulated import AnyEmulated

@@ -15,7 +15,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from cubestack.emulator.camera.common.star_sensor import StarSensor
+from cubestack.emulator.camera.common.image_sensor import StarSensor
 from cubestack.emulator.camera.common.view import View
 from cubestack.emulator.scene.attitude import quaternion_from_pointing
 from cubestack.emulator.scene.sky import SkyScene

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from cubestack.emulator.boards.cubestar.power import CUBESTAR_POWER
+from cubestack.emulator.boards.cubestar.layouts import CUBESTAR_POWER
 from cubestack.emulator.camera.common.view import SkyView
 from cubestack.emulator.camera.mlx75412.lens import CONDITION
 from cubestack.emulator.scene.attitude import attitude_error_deg, random_quaternion

@@ -6,10 +6,9 @@ from fractions import Fraction
 import numpy as np
 
 from cubestack.emulator.boards.cubesense.wiring import cubesense_wiring
-from cubestack.emulator.rtl.benchmark import ROUNDS
+from cubestack.emulator.rtl.benchmark import ROUNDS, RepeatedFrame
 from cubestack.emulator.rtl.contract import RtlEngine
 from cubestack.emulator.rtl.factory import make_engine
-from cubestack.emulator.rtl.repeated_frame import RepeatedFrame
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.interface.cameras import ov7620
 from cubestack.firmware_model.interface.cameras.ov7620 import CLOCKS_PER_LINE, LINES_PER_FRAME

@@ -6,10 +6,9 @@ from fractions import Fraction
 import numpy as np
 
 from cubestack.emulator.boards.cubestar.wiring import cubestar_wiring
-from cubestack.emulator.rtl.benchmark import ROUNDS
+from cubestack.emulator.rtl.benchmark import ROUNDS, RepeatedFrame
 from cubestack.emulator.rtl.contract import RtlEngine
 from cubestack.emulator.rtl.factory import make_engine
-from cubestack.emulator.rtl.repeated_frame import RepeatedFrame
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.interface.cameras.mlx75412 import CRYSTAL_HZ, LINE_CLOCKS
 from cubestack.firmware_model.interface.cubestar.pins import ACK, ENABLE, RNW

@@ -10,7 +10,7 @@ from typing import Unpack
 
 from cubestack.emulator.boards.contract import BoardOptions
 from cubestack.emulator.boards.cubestar.stack import FORCED_RESETS, CubeStarStack
-from cubestack.emulator.boards.peripherals import I2cCameraBus, NodePeripherals
+from cubestack.emulator.boards.node import I2cCameraBus, NodePeripherals
 from cubestack.emulator.camera.common.view import SkyView
 from cubestack.emulator.faults.sites import Sites
 from cubestack.emulator.rtl.factory import EngineKind

@@ -11,8 +11,7 @@ from typing import Unpack
 
 from cubestack.emulator.boards.contract import BoardOptions
 from cubestack.emulator.boards.cubestar.stack import FORCED_RESETS, CubeStarStack
-from cubestack.emulator.boards.firmware import CameraWire, Core, SerialWire, SlaveWire
-from cubestack.emulator.boards.insight import Insight
+from cubestack.emulator.boards.firmware import CameraWire, Core, Insight, SerialWire, SlaveWire
 from cubestack.emulator.bus.line_format import LineFormat
 from cubestack.emulator.camera.common.view import SkyView
 from cubestack.emulator.faults.sites import Sites

@@ -1,24 +1,75 @@
-"""Base class of the image sensors: scene, condition, supply and pixel clock."""
+"""Base classes of the image sensors, and their parallel output.
+
+Pixel data, HSync and VSync change with the falling edge of the pixel clock and are valid at its
+rising edge (CubeStar thesis, appendix C).
+"""
 
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, ClassVar, Generic
 
+import numpy as np
+from numpy.typing import NDArray
+
 from cubestack.emulator.camera.common.imager import Grey
 from cubestack.emulator.camera.common.register_file import RegisterFile
-from cubestack.emulator.camera.common.stream import PixelClock
-from cubestack.emulator.camera.common.view import C, S, View
+from cubestack.emulator.camera.common.view import C, S, SkyCondition, View
+from cubestack.emulator.scene.sky import PictureScene, Scene, SkyScene
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.interface.cameras.registers import CameraRegisterMap
+
+
+@dataclass(frozen=True)
+class StreamSegment:
+    """A ``rtl.pixel_clock.PixelSegment``: blanking, or whole lines.
+
+    Each line begins with its active columns, while HSync is high.
+    """
+
+    start_ps: int
+    clocks: int
+    vsync: int
+    rows: int
+    pixels: Callable[[], NDArray[np.uint8]] | None
+
+
+@dataclass(frozen=True)
+class PixelClock:
+    """A free-running clock: rising edge k is at floor(origin + k * period)."""
+
+    hz: int
+    origin_ps: int = 0
+
+    def __post_init__(self) -> None:
+        if self.hz <= 0:
+            raise ValueError(f"a pixel clock needs a positive frequency, not {self.hz} Hz")
+
+    @property
+    def period(self) -> Fraction:
+        return Fraction(PS_PER_S, self.hz)
+
+    def edge_ps(self, k: int) -> int:
+        return self.origin_ps + k * PS_PER_S // self.hz
+
+    def end_ps(self, first: int, clocks: int) -> int:
+        """End of ``clocks`` clocks for a consumer that counts from edge ``first``."""
+        return self.edge_ps(first) + clocks * PS_PER_S // self.hz
+
+    def first_edge(self, time_ps: int) -> int:
+        """Number of the first rising edge at ``time_ps`` or later."""
+        # floor(k * period) >= t exactly when k * period >= t, because t is an integer.
+        return max(0, -(-(time_ps - self.origin_ps) * self.hz // PS_PER_S))
+
 
 KEPT = 2
 """Cached images: one whose storing began in the middle, and the whole one after it."""
 
 
 class ImageSensor(ABC, Generic[S, C]):
-    """One sensor with its lens, powered from time 0 on.
+    """One sensor with its lens, powered from time 0 on: scene, condition, supply, pixel clock.
 
     Attributes:
         scene_types: accepted classes of scenes.
@@ -131,3 +182,60 @@ class ImageSensor(ABC, Generic[S, C]):
             self._images = deque((each for each in self._images if each is not image), KEPT)
         self._images.append(image)
         return image[1]
+
+
+class StarSensor(ImageSensor[Scene, SkyCondition]):
+    """A star tracker's sensor, for the sky or a photograph: reset pin and two-wire bus."""
+
+    scene_types = (SkyScene, PictureScene)
+    sees = "a star tracker's scene is a sky or a picture"
+    columns: ClassVar[int]
+    rows: ClassVar[int]
+    word_bytes: ClassVar[int]  # bytes per address of its registers
+
+    def _check(self, scene: Scene, condition: SkyCondition) -> None:
+        lens = condition.optics
+        if (lens.columns, lens.rows) != (self.columns, self.rows):
+            raise ValueError(
+                f"the {self._table.camera} has {self.columns} x {self.rows} pixels, but the lens "
+                f"is for {lens.columns} x {lens.rows}"
+            )
+        if isinstance(scene, PictureScene):
+            scene.part(self.columns, self.rows)
+
+    @property
+    def temperature_c(self) -> float:
+        return self.condition.temperature_c
+
+    def set_reset_pin(self, level: int, now_ps: int) -> None:
+        """Drive the reset pin, active low."""
+        self._in_reset = not level
+        self._start_or_stop(now_ps)
+
+    def i2c_write(self, address: int, data: bytes, now_ps: int) -> bool:
+        """Handle a write message to the 7-bit ``address``; returns whether to acknowledge it.
+
+        ``data`` is a register's address, then words for that register and the following ones, upper
+        byte first; an incomplete word is dropped.
+        """
+        if not self.running or address != self._table.i2c_address:
+            return False
+        head = self._table.address_bytes
+        if len(data) >= head:
+            self._registers.select(int.from_bytes(data[:head]))
+            ends = range(head + self.word_bytes, len(data) + 1, self.word_bytes)
+            words = [int.from_bytes(data[end - self.word_bytes : end]) for end in ends]
+            self._write(words, now_ps)
+        return True
+
+    def i2c_read(self, address: int, count: int, now_ps: int) -> bytes | None:
+        """Read ``count`` bytes from the last register address on; None if not acknowledged."""
+        del now_ps
+        if not self.running or address != self._table.i2c_address:
+            return None
+        size = self.word_bytes
+        words = (self._registers.read().to_bytes(size) for _ in range(-(-count // size)))
+        return b"".join(words)[:count]
+
+    @abstractmethod
+    def _write(self, words: list[int], now_ps: int) -> None: ...

@@ -18,10 +18,9 @@ from functools import partial
 
 import numpy as np
 
+from cubestack.emulator.camera.common.image_sensor import PixelClock, StarSensor, StreamSegment
 from cubestack.emulator.camera.common.imager import Grey
 from cubestack.emulator.camera.common.shutter import RollingShutter
-from cubestack.emulator.camera.common.star_sensor import StarSensor
-from cubestack.emulator.camera.common.stream import PixelClock, StreamSegment
 from cubestack.emulator.camera.common.view import SkyCondition, SkyView
 from cubestack.emulator.camera.mlx75412.imager import Corrections, Mlx75412Imager
 from cubestack.emulator.camera.mlx75412.lens import CONDITION

@@ -1,24 +1,64 @@
-"""Renders frames of the MT9M001: light, noise, window.
+"""Renders frames of the MT9M001: light, noise from electrons to eight bits, window.
+
+AraMiS thesis, section 3.4: shot noise of the stars' light (equation 3.3), dark current (3.4),
+background, quantisation (3.5, 3.6) and read-out noise (3.7), added as variances (3.8). Each term
+can be switched off. MT9M001 data sheet, key performance: a signal to noise ratio of at most 45 dB
+and a dynamic range of 68.2 dB, from which the full well (its square root is that ratio) and the
+read-out noise follow. Values that neither publishes are marked as assumed.
 
 Shot, dark, background and read-out noise are drawn at once, as one normal distribution with the
 mean and the variance of their sum.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cubestack.emulator.camera.common.dark import hot_pixels
+from cubestack.emulator.camera.common.dark import dark_at, hot_pixels
 from cubestack.emulator.camera.common.hazards import effects
 from cubestack.emulator.camera.common.imager import Grey, Imager, Light
 from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.common.view import SkyCondition
-from cubestack.emulator.camera.mt9m001 import noise as physics
 from cubestack.emulator.camera.mt9m001.registers import SensorSettings
 from cubestack.emulator.scene.sky import Scene
 from cubestack.firmware_model.interface.cameras.mt9m001 import COLUMNS, ROWS
 
+FULL_WELL_ELECTRONS = 10 ** (45 / 10)
+READ_NOISE_ELECTRONS = FULL_WELL_ELECTRONS / 10 ** (68.2 / 20)
+
 COUNTS = 256  # eight bits are wired
+FULL_SCALE = 1023
+"""Full scale of the converter, 10 bits, of which the upper 8 are wired."""
+
+BLACK_LEVEL = 6
+"""In counts of 10 bits: between thresholds 4 and 9 of the sensor's calibration (assumed)."""
+
+BACKGROUND_ELECTRONS_PER_S = 15.0
+"""Per pixel: a dark sky of 22 mag/arcsec2 and the same amount of stray light (assumed)."""
+
+DARK_ELECTRONS_PER_S_AT_25_C = 50.0  # assumed
+HOT_SHARE = 500.0  # assumed: mean dark current of hot pixels relative to the others
+
+
+@dataclass(frozen=True)
+class NoiseTerms:
+    """The terms of equation 3.8 that are on."""
+
+    shot: bool = True  # noise of the stars' light
+    dark: bool = True  # dark current, hot pixels and their noise
+    background: bool = True  # background light and its noise
+    # the converter's 10 bits, of which 8 are wired; off: the nearest of 256 counts, the smallest
+    # error with eight bits
+    quantisation: bool = True
+    readout: bool = True  # noise of the amplifiers
+
+    @classmethod
+    def none(cls) -> "NoiseTerms":
+        return cls(shot=False, dark=False, background=False, quantisation=False, readout=False)
+
+
+def dark_electrons_per_s(temperature_c: float) -> float:
+    return dark_at(DARK_ELECTRONS_PER_S_AT_25_C, temperature_c, 25.0)
 
 
 class Mt9m001Imager(Imager[SensorSettings]):
@@ -27,8 +67,8 @@ class Mt9m001Imager(Imager[SensorSettings]):
     def __init__(
         self,
         seed: int = 0,
-        noise: physics.NoiseTerms | None = None,
-        background_electrons_per_s: float = physics.BACKGROUND_ELECTRONS_PER_S,
+        noise: NoiseTerms | None = None,
+        background_electrons_per_s: float = BACKGROUND_ELECTRONS_PER_S,
     ) -> None:
         """Create the imager.
 
@@ -38,7 +78,7 @@ class Mt9m001Imager(Imager[SensorSettings]):
             background_electrons_per_s: background light in each pixel.
         """
         self._seed = seed
-        self._noise = noise or physics.NoiseTerms()
+        self._noise = noise or NoiseTerms()
         self._background = background_electrons_per_s
 
     def render(
@@ -56,7 +96,7 @@ class Mt9m001Imager(Imager[SensorSettings]):
 
     def electrons_per_count(self, settings: SensorSettings) -> float:
         """For the mean of the four gains; see ``Imager``."""
-        return physics.FULL_WELL_ELECTRONS / (COUNTS * float(np.mean(settings.gains)))
+        return FULL_WELL_ELECTRONS / (COUNTS * float(np.mean(settings.gains)))
 
     def counts(
         self,
@@ -66,18 +106,18 @@ class Mt9m001Imager(Imager[SensorSettings]):
         settings: SensorSettings,
         generator: np.random.Generator | None,
     ) -> Grey:
-        terms = physics.NoiseTerms.none() if generator is None else self._noise
+        terms = NoiseTerms.none() if generator is None else self._noise
         surplus = self._background * exposure_s if terms.background else 0.0
-        own_dark = physics.dark_electrons_per_s(condition.temperature_c) * exposure_s
+        own_dark = dark_electrons_per_s(condition.temperature_c) * exposure_s
         dark = own_dark * effects.dark_rise(condition.hazards)
         if terms.dark:
             surplus += dark
         mean = light + np.float32(surplus)
         if terms.dark and condition.hot_count:
             seed = condition.seed + self._seed
-            places, share = hot_pixels(seed, condition.hot_count, light.size, physics.HOT_SHARE)
+            places, share = hot_pixels(seed, condition.hot_count, light.size, HOT_SHARE)
             mean.ravel()[places] += share * np.float32(own_dark)
-        steady = physics.READ_NOISE_ELECTRONS**2 if terms.readout else 0.0
+        steady = READ_NOISE_ELECTRONS**2 if terms.readout else 0.0
         exposure = self.exposure((ROWS, COLUMNS), exposure_s, condition, settings)
         steady += effects.variance(condition.hazards, exposure)
         variance = (mean if terms.shot else mean - light) + np.float32(steady)
@@ -89,14 +129,14 @@ class Mt9m001Imager(Imager[SensorSettings]):
         # The chip subtracts the mean of the dark rows, which contains the mean dark current.
         if terms.dark:
             signal -= np.float32(dark)
-        scale = (physics.FULL_SCALE + 1) / physics.FULL_WELL_ELECTRONS
+        scale = (FULL_SCALE + 1) / FULL_WELL_ELECTRONS
         signal *= _gain(settings) * np.float32(scale)
-        signal += np.float32(physics.BLACK_LEVEL)
+        signal += np.float32(BLACK_LEVEL)
         if not terms.quantisation:
             signal /= np.float32(4)
-            nearest: Light = np.clip(signal + np.float32(0.5), 0, physics.FULL_SCALE // 4)
+            nearest: Light = np.clip(signal + np.float32(0.5), 0, FULL_SCALE // 4)
             return nearest.astype(np.uint8)
-        whole: Light = np.clip(signal + np.float32(0.5), 0, physics.FULL_SCALE)
+        whole: Light = np.clip(signal + np.float32(0.5), 0, FULL_SCALE)
         return (whole.astype(np.uint16) >> 2).astype(np.uint8)
 
 
@@ -113,7 +153,7 @@ def _window(full: Grey, settings: SensorSettings) -> Grey:
     shape = (settings.rows, settings.columns)
     if (settings.row, settings.column) == (0, 0) and full.shape == shape:
         return full
-    window = np.full(shape, physics.BLACK_LEVEL >> 2, np.uint8)
+    window = np.full(shape, BLACK_LEVEL >> 2, np.uint8)
     top, left = max(0, settings.row), max(0, settings.column)
     bottom = min(ROWS, settings.row + settings.rows)
     right = min(COLUMNS, settings.column + settings.columns)

@@ -16,14 +16,12 @@ from collections import deque
 from dataclasses import dataclass
 from functools import partial
 
+from cubestack.emulator.camera.common.image_sensor import PixelClock, StarSensor, StreamSegment
 from cubestack.emulator.camera.common.imager import Grey
 from cubestack.emulator.camera.common.shutter import RollingShutter
-from cubestack.emulator.camera.common.star_sensor import StarSensor
-from cubestack.emulator.camera.common.stream import PixelClock, StreamSegment
 from cubestack.emulator.camera.common.view import SkyCondition, SkyView
-from cubestack.emulator.camera.mt9m001.imager import Mt9m001Imager
+from cubestack.emulator.camera.mt9m001.imager import Mt9m001Imager, NoiseTerms
 from cubestack.emulator.camera.mt9m001.lens import CONDITION
-from cubestack.emulator.camera.mt9m001.noise import NoiseTerms
 from cubestack.emulator.camera.mt9m001.registers import SensorSettings, read_settings, write_word
 from cubestack.emulator.scene.sky import Scene
 from cubestack.firmware_model.interface.cameras import mt9m001 as chip

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from cubestack.emulator.camera.common.residual import displace, restore
 from cubestack.emulator.camera.ov7620.lens_error import FIELD_DEG, NOMINAL, LensError
-from cubestack.emulator.scene.angles import angles_from_vector, vector_from_angles
+from cubestack.emulator.scene.attitude import angles_from_vector, vector_from_angles
 from cubestack.emulator.scene.earth_sun import CameraTarget
 from cubestack.emulator.scene.file import SceneError
 from cubestack.firmware_model.interface.cameras.ov7620 import COLUMNS, ROWS

@@ -24,11 +24,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cubestack.emulator.camera.common.glow import brightness
-from cubestack.emulator.camera.ov7620.blur import blur
 from cubestack.emulator.camera.ov7620.fisheye import Fisheye, lens_of
 from cubestack.emulator.camera.ov7620.lens_error import FIELD_DEG, NOMINAL, LensError
 from cubestack.emulator.camera.ov7620.luminance import SPOT_PX
-from cubestack.emulator.scene.angles import vector_from_angles
+from cubestack.emulator.scene.attitude import vector_from_angles
 from cubestack.emulator.scene.earth import angular_radius_deg
 from cubestack.emulator.scene.earth_sun import CameraTarget, EarthSunScene
 from cubestack.emulator.scene.hazards.contract import (
@@ -239,3 +238,24 @@ def _patch(light: Light, centre: NDArray[np.float64], reach: float) -> tuple[Lig
     rows, columns = patch.shape
     dx, dy = np.arange(left, left + columns) - x, np.arange(top, top + rows) - y
     return patch, (dx * dx + (dy * dy)[:, None]).astype(np.float32)
+
+
+REACH_SIGMAS = 4.0
+
+
+def blur(light: NDArray[np.float32], sigma_px: float) -> NDArray[np.float32]:
+    """``light`` (rows, columns) with spots of this standard deviation; dark beyond the edges."""
+    half = math.ceil(REACH_SIGMAS * sigma_px)
+    edges = (np.arange(2 * half + 2) - half - 0.5) / (sigma_px * math.sqrt(2))
+    shares = np.diff([math.erf(edge) for edge in edges])
+    shares /= shares.sum()
+    return _along_rows(_along_rows(light, shares).T, shares).T
+
+
+def _along_rows(light: NDArray[np.float32], shares: NDArray[np.float64]) -> NDArray[np.float32]:
+    half, columns = len(shares) // 2, light.shape[1]
+    wide = np.pad(light, ((0, 0), (half, half)))
+    total = np.zeros_like(light)
+    for first, share in enumerate(shares):
+        total += np.float32(share) * wide[:, first : first + columns]
+    return total

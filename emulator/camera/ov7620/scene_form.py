@@ -8,7 +8,7 @@ from cubestack.emulator.camera.common.view import View
 from cubestack.emulator.camera.ov7620.lens_error import FIELD_DEG, NOMINAL, LensError
 from cubestack.emulator.camera.ov7620.scene_file import earth_sun_keys
 from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
-from cubestack.emulator.scene.angles import vector_from_angles
+from cubestack.emulator.scene.attitude import vector_from_angles
 from cubestack.emulator.scene.earth import angular_radius_deg
 from cubestack.emulator.scene.earth_sun import CameraTarget, EarthSunScene, Mounting, Reflection
 from cubestack.emulator.scene.form import (

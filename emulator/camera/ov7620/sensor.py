@@ -23,14 +23,12 @@ import numpy as np
 
 from cubestack.emulator.camera.common.hazards import effects
 from cubestack.emulator.camera.common.hazards.contract import Exposure, Lens
-from cubestack.emulator.camera.common.image_sensor import ImageSensor
+from cubestack.emulator.camera.common.image_sensor import ImageSensor, PixelClock, StreamSegment
 from cubestack.emulator.camera.common.imager import Grey, Light
 from cubestack.emulator.camera.common.shutter import RollingShutter
-from cubestack.emulator.camera.common.stream import PixelClock, StreamSegment
-from cubestack.emulator.camera.ov7620.blur import blur
 from cubestack.emulator.camera.ov7620.fisheye import check_field
 from cubestack.emulator.camera.ov7620.lens_error import NOMINAL, LensError
-from cubestack.emulator.camera.ov7620.light import scene_light
+from cubestack.emulator.camera.ov7620.light import blur, scene_light
 from cubestack.emulator.camera.ov7620.luminance import (
     BLACK,
     ELECTRONS_PER_GREY,

@@ -17,7 +17,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cubestack.emulator.scene.angles import vector_from_angles
+from cubestack.emulator.scene.attitude import vector_from_angles
 from cubestack.emulator.scene.file import SceneError
 from cubestack.emulator.scene.hazards.hazard import Hazard
 

@@ -34,9 +34,9 @@ from cubestack.emulator.scene.hazards.contract import (
     direction,
     random_direction_at,
 )
-from cubestack.emulator.scene.hazards.glare import OUTER_RAD, aureole
 from cubestack.emulator.scene.hazards.hazard import Strength, heading
 from cubestack.emulator.scene.hazards.sky_glow import S10
+from cubestack.emulator.scene.hazards.sun_glare import OUTER_RAD, aureole
 from cubestack.firmware_model.values import number
 
 AIRGLOW_KM, AIRGLOW_SIGMA_KM, AIRGLOW_S10 = 95.0, 4.0, 145.0

@@ -11,7 +11,7 @@ from typing import Self
 
 import numpy as np
 
-from cubestack.emulator.scene.angles import angles_from_vector, vector_from_angles
+from cubestack.emulator.scene.attitude import angles_from_vector, vector_from_angles
 from cubestack.emulator.scene.hazards.contract import (
     SUN_RADIUS_DEG,
     SUN_V,
@@ -25,8 +25,8 @@ from cubestack.emulator.scene.hazards.contract import (
     angles_rad,
     direction,
 )
-from cubestack.emulator.scene.hazards.glare import SHARE, aureole
 from cubestack.emulator.scene.hazards.hazard import Strength, heading
+from cubestack.emulator.scene.hazards.sun_glare import SHARE, aureole
 from cubestack.firmware_model.values import number, whole
 
 PLACES = (-1.1, 0.5)

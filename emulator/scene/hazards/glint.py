@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cubestack.emulator.scene.angles import vector_from_angles
+from cubestack.emulator.scene.attitude import vector_from_angles
 from cubestack.emulator.scene.hazards.contract import (
     SUN_V,
     Brightness,

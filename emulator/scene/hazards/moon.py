@@ -26,8 +26,8 @@ from cubestack.emulator.scene.hazards.contract import (
     direction,
     random_direction_at,
 )
-from cubestack.emulator.scene.hazards.glare import SHARE, aureole
 from cubestack.emulator.scene.hazards.hazard import Strength, heading
+from cubestack.emulator.scene.hazards.sun_glare import SHARE, aureole
 from cubestack.firmware_model.values import number
 
 RADIUS_RAD = math.radians(0.2591)

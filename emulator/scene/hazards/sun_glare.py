@@ -1,12 +1,17 @@
-"""Stray light of a bright source outside the field: the part that gets past the baffle.
+"""Stray light of a bright source: scattered by the lens in its field, or past its baffle.
 
-The point source transmittance of a baffle falls by decades with the source's angle from the
-boresight: measured curves of star trackers are nearly straight on a logarithmic scale up to the
-angle beyond which the source lights no surface that the lens sees. Here it is the brightness per
-steradian of the sky relative to the source's light, which is 4 N^2 / pi times the irradiance ratio
-behind a lens of the f-number N. Assumed: 1e-7 at 45 deg (an irradiance ratio of 5e-8 at f/1.25, of
-a small baffle), a decade in 15 deg; across the picture the stray light falls exponentially with the
-angle from the source, to 1/e in ``slope_deg``.
+A source in the field. Assumed: a hundredth of the light is scattered, like the veiling glare of
+clean multi-element lenses (ISO 9358 measures 1 to 3 % for usual ones), and its surface brightness
+decreases with the square of the angle, like the aureole of stars (King 1971, PASP 83, 199), from
+the angle of the Moon's limb to 45 degrees.
+
+A source outside the field. The point source transmittance of a baffle falls by decades with the
+source's angle from the boresight: measured curves of star trackers are nearly straight on a
+logarithmic scale up to the angle beyond which the source lights no surface that the lens sees. Here
+it is the brightness per steradian of the sky relative to the source's light, which is 4 N^2 / pi
+times the irradiance ratio behind a lens of the f-number N. Assumed: 1e-7 at 45 deg (an irradiance
+ratio of 5e-8 at f/1.25, of a small baffle), a decade in 15 deg; across the picture the stray light
+falls exponentially with the angle from the source, to 1/e in ``slope_deg``.
 """
 
 import math
@@ -14,6 +19,7 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cubestack.emulator.scene.hazards.contract import (
     SUN_RADIUS_DEG,
@@ -29,6 +35,20 @@ from cubestack.emulator.scene.hazards.contract import (
 )
 from cubestack.emulator.scene.hazards.hazard import Strength, heading
 from cubestack.firmware_model.values import number
+
+SHARE = 0.01
+INNER_RAD, OUTER_RAD = math.radians(0.26), math.radians(45.0)
+
+
+def aureole(away_rad: NDArray[np.float64], share: float = SHARE) -> NDArray[np.float64]:
+    """Scattered brightness (n,) per steradian at these angles (n,) from a source of brightness 1.
+
+    ``share`` of its light is scattered. Within the inner angle the brightness is constant.
+    """
+    scale = share / (2 * math.pi * math.log(OUTER_RAD / INNER_RAD))
+    falling = scale / np.maximum(away_rad, INNER_RAD) ** 2
+    return np.asarray(np.where(away_rad < OUTER_RAD, falling, 0.0))
+
 
 REFERENCE_DEG = 45.0
 MOST = 1.0

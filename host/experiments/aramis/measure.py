@@ -28,8 +28,8 @@ from cubestack.emulator.boards.aramis.board import AramisBoard
 from cubestack.emulator.boards.aramis.catalogue import onboard_database
 from cubestack.emulator.camera.common.scene_file import load_scene
 from cubestack.emulator.camera.common.view import SkyCondition, SkyView, View
+from cubestack.emulator.camera.mt9m001.imager import NoiseTerms
 from cubestack.emulator.camera.mt9m001.lens import double_gauss
-from cubestack.emulator.camera.mt9m001.noise import NoiseTerms
 from cubestack.emulator.scene.attitude import matrix_from_quaternion
 from cubestack.emulator.scene.hipparcos import load_sky
 from cubestack.emulator.scene.sky import PictureScene, SkyScene

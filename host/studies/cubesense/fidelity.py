@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 
-from cubestack.emulator.boards.cubesense.power import CUBESENSE_POWER
+from cubestack.emulator.boards.cubesense.board import CUBESENSE_POWER
 from cubestack.emulator.camera.ov7620 import fisheye, lens_error, light
 from cubestack.emulator.camera.ov7620.view import FisheyeCondition
 from cubestack.emulator.scene.earth import EARTH_RADIUS_KM, angular_radius_deg

@@ -16,7 +16,7 @@ from cubestack.emulator.boards.cubestar.compiled.build import (
 )
 from cubestack.emulator.boards.cubestar.compiled.machine import Timing, start_program
 from cubestack.emulator.boards.cubestar.compiled.picture import default_settings, run, run_model
-from cubestack.emulator.camera.common.star_sensor import StarSensor
+from cubestack.emulator.camera.common.image_sensor import StarSensor
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.firmware_model.interface.efm32gg import LAYOUTS
 from cubestack.firmware_model.interface.efm32gg.c_header import c_header

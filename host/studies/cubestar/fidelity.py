@@ -8,7 +8,7 @@ import numpy as np
 
 from cubestack.emulator.boards.cubestar.board import BOOT_US
 from cubestack.emulator.boards.cubestar.catalogue import onboard_catalogue
-from cubestack.emulator.boards.cubestar.power import CUBESTAR_POWER
+from cubestack.emulator.boards.cubestar.layouts import CUBESTAR_POWER
 from cubestack.emulator.scene.attitude import random_quaternion
 from cubestack.emulator.scene.hipparcos import CATALOGUE_EPOCH, load_sky
 from cubestack.emulator.scene.sky import SkyScene

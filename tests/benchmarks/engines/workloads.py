@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from cubestack.emulator.boards.cubesense.wiring import cubesense_wiring
 from cubestack.emulator.boards.cubestar import wiring as cubestar
+from cubestack.emulator.rtl.benchmark import RepeatedFrame
 from cubestack.emulator.rtl.contract import RtlEngine
-from cubestack.emulator.rtl.repeated_frame import RepeatedFrame
 from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.interface.cameras.mlx75412 import CRYSTAL_HZ, LINE_CLOCKS

@@ -2,9 +2,9 @@
 
 import pytest
 
-from cubestack.emulator.boards.aramis.power import ARAMIS_POWER
-from cubestack.emulator.boards.cubesense.power import CUBESENSE_POWER
-from cubestack.emulator.boards.cubestar.power import CUBESTAR_POWER
+from cubestack.emulator.boards.aramis.board import ARAMIS_POWER
+from cubestack.emulator.boards.cubesense.board import CUBESENSE_POWER
+from cubestack.emulator.boards.cubestar.layouts import CUBESTAR_POWER
 from cubestack.emulator.sim.power import PowerModel, PowerTable
 from cubestack.emulator.sim.virtual_time import Kernel
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from cubestack.emulator.camera.common.image_sensor import StreamSegment
 from cubestack.emulator.scene.file import SceneError
 
 
@@ -22,3 +23,12 @@ def check_refused(load: Callable[[Path], Any], path: Path, complaint: str) -> No
     assert complaint in message
     assert str(path) in message
     assert "\n" not in message
+
+
+def segments(camera: Any, start_ps: int, count: int) -> list[StreamSegment]:
+    found = []
+    for _ in range(count):
+        segment = camera.segment_at(start_ps)
+        found.append(segment)
+        start_ps = segment.start_ps + int(segment.clocks * camera.period)
+    return found

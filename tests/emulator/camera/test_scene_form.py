@@ -15,7 +15,7 @@ from cubestack.emulator.camera.mt9m001.lens import double_gauss
 from cubestack.emulator.camera.ov7620.scene_file import load_earth_sun_scene
 from cubestack.emulator.camera.ov7620.scene_form import earth_sun_form
 from cubestack.emulator.scene.attitude import matrix_from_pointing
-from cubestack.emulator.scene.toml_text import toml_text
+from cubestack.emulator.scene.file import toml_text
 from cubestack.firmware_model.values import plain
 
 from .files import save

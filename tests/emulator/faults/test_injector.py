@@ -2,7 +2,7 @@ from typing import Any, cast
 
 import pytest
 
-from cubestack.emulator.boards.cubestar.power import CUBESTAR_POWER
+from cubestack.emulator.boards.cubestar.layouts import CUBESTAR_POWER
 from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.faults import injector
 from cubestack.emulator.faults.declaration import FaultError, Site

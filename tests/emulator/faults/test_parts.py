@@ -5,8 +5,14 @@ import pytest
 
 from cubestack.emulator.faults.declaration import FaultError
 from cubestack.emulator.faults.injection import Injection
-from cubestack.emulator.faults.parts import BATCH_S, MOST_UPSETS_PER_S, CoreFaults, MemoryFaults
-from cubestack.emulator.faults.seu import flip_bit, flip_bits
+from cubestack.emulator.faults.parts import (
+    BATCH_S,
+    MOST_UPSETS_PER_S,
+    CoreFaults,
+    MemoryFaults,
+    flip_bit,
+    flip_bits,
+)
 from cubestack.emulator.faults.table import CoreFlip, CoreUpsets, MemoryUpsets
 from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cubestack.emulator.camera.common.stream import StreamSegment
+from cubestack.emulator.camera.common.image_sensor import StreamSegment
 from cubestack.emulator.faults import table
 from cubestack.emulator.faults.injection import Injection
 from cubestack.emulator.faults.pixels import FaultySource

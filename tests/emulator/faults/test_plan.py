@@ -5,10 +5,20 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
 
+from cubestack.emulator.faults import table
 from cubestack.emulator.faults.declaration import FaultError
 from cubestack.emulator.faults.plan import PlannedFault, load_plan, parse_plan
-from cubestack.emulator.faults.table import AckLost, LatchUp, UartDrop
+from cubestack.emulator.faults.table import (
+    FAULTS,
+    AckLost,
+    LatchUp,
+    UartDrop,
+    make_fault,
+    markdown_table,
+)
 
 PLAN = """
 seed = 7
@@ -87,3 +97,35 @@ def test_damaged_plans_raise_only_plan_errors() -> None:
             text[generator.randrange(len(text))] = chr(generator.randrange(10, 127))
         with suppress(FaultError):
             parse_plan("".join(text))
+
+
+DOCUMENT = Path(__file__).parents[3] / "docs" / "reference" / "fault-kinds.md"
+
+
+@pytest.mark.parametrize("kind", FAULTS)
+def test_a_fault_is_declared_in_full(kind: str) -> None:
+    fault = FAULTS[kind]
+    assert fault.kind == kind
+    assert fault.effect().endswith(".")
+    assert fault() == make_fault(kind)  # every parameter has a default
+    assert vars(table)[fault.__name__] is fault
+    assert fault.__doc__ != "Base of all faults."
+
+
+@example("kind", 1)
+@given(st.text(max_size=8), st.one_of(st.none(), st.text(), st.integers(), st.floats()))
+def test_any_value_raises_at_most_a_fault_error(name: str, value: object) -> None:
+    for kind, fault in FAULTS.items():
+        for known in (name, *fault.declared()):
+            with suppress(FaultError):
+                make_fault(kind, **{known: value})
+
+
+def test_the_document_has_the_table_as_declared() -> None:
+    assert markdown_table() in DOCUMENT.read_text(encoding="utf-8")
+
+
+def test_the_document_has_a_reaction_to_every_fault() -> None:
+    reactions = DOCUMENT.read_text(encoding="utf-8").split("## What the firmware does about it")[1]
+    for kind in FAULTS:
+        assert f"| `{kind}` |" in reactions

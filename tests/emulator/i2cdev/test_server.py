@@ -5,13 +5,15 @@ import os
 import select
 import socket
 import stat
-from contextlib import suppress
+from contextlib import closing, suppress
 from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from cubestack.emulator.i2cdev import running
+from cubestack.emulator.i2cdev.adapter import I2cAdapter
 from cubestack.emulator.i2cdev.server import MAX_CLIENTS, _Client
 from cubestack.emulator.ports.endpoint import PortError
 from cubestack.firmware_model.formats import linux_i2c as linux
@@ -257,3 +259,18 @@ def test_closing_removes_the_socket(tmp_path, serve_at):
     server = serve_at(tmp_path / "private" / "bus")
     server.close()
     assert not os.path.lexists(server.name)
+
+
+def test_a_program_without_supervisor_is_served_until_it_ends(
+    adapter: I2cAdapter, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(running, "shim_library", lambda: tmp_path / "none.so")
+    bus = running.emulated_bus(adapter.env, lambda: False, adapter, tmp_path / "bus")
+    said: list[str] = []
+    command = ["sh", "-c", "exit 3"]
+    with closing(bus.port):
+        code = running.run_program(
+            command, 7, bus, pace="fast", route="preload", report=said.append
+        )
+    assert code == 3
+    assert said[0] == "/dev/i2c-7 is served by preload, as requested"

@@ -1,6 +1,7 @@
-"""The cache of compiled libraries: where it is, who may write there, and what leaves it."""
+"""Which compiler is taken, the cache of compiled libraries, and those inside a wheel."""
 
 import os
+import sys
 import tempfile
 import threading
 import time
@@ -9,8 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from cubestack.emulator.native import cache
-from cubestack.emulator.native.compiler import Compiler, find_compiler
+from cubestack.emulator.native import cache, compiler
+from cubestack.emulator.native.compiler import Compiler, NoCompilerError, find_compiler
+from tests.emulator.fake_compiler import make_compiler
 
 
 @pytest.fixture
@@ -107,3 +109,91 @@ def test_who_comes_second_waits_for_what_is_being_built(
     ask()
     second.join(30.0)
     assert len(builds) == 1
+
+
+def test_cxx_comes_first_and_version_tells_compilers_apart(tmp_path, monkeypatch):
+    monkeypatch.setenv("CXX", str(make_compiler(tmp_path, "mycc", "exit 1", "one")))
+    first = compiler.find_compiler()
+    assert first is not None
+    assert first.command == (str(tmp_path / "mycc"),)
+    make_compiler(tmp_path, "mycc", "exit 1", "two")
+    assert compiler.find_compiler() != first
+
+
+def test_broken_compiler_is_passed_over(without_compiler, tmp_path):
+    (tmp_path / "c++").write_text("#!/bin/sh\nexit 1\n")
+    (tmp_path / "c++").chmod(0o755)
+    assert compiler.find_compiler() is None
+    make_compiler(tmp_path, "clang++", "exit 1")
+    found = compiler.find_compiler()
+    assert found is not None
+    assert found.command == (str(tmp_path / "clang++"),)
+
+
+def test_ziglang_wheel_is_the_last_resort(without_compiler, monkeypatch):
+    monkeypatch.setattr(
+        compiler.importlib.util, "find_spec", lambda name: name == "ziglang" or None
+    )
+    monkeypatch.setattr(compiler, "version", lambda name: f"7.8 of {name}")
+    assert compiler.find_compiler() == compiler.Compiler(
+        (sys.executable, "-m", "ziglang", "c++"), "ziglang 7.8 of ziglang"
+    )
+
+
+def test_cache_is_where_the_user_wants_it(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    assert cache.cache_folder() == tmp_path / "cubestack"
+    monkeypatch.setenv("XDG_CACHE_HOME", "")
+    assert cache.cache_folder() == Path.home() / ".cache" / "cubestack"
+
+
+LIBRARY = b"\x7fELF and so on" * 1000
+
+
+def refuse_to_build(_compiler: Compiler, _scratch: Path, _log: Path) -> Path:
+    raise AssertionError("nothing must be built")
+
+
+RECIPE = cache.recipe("a design", "design", [], refuse_to_build)
+
+
+@pytest.fixture
+def shipped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The shipped library; there is no compiler."""
+    monkeypatch.delenv("CXX", raising=False)
+    monkeypatch.setattr(cache.compilers, "find_compiler", lambda: None)
+    monkeypatch.setattr(cache, "SHIPPED", tmp_path)
+    name = f"{cache.hash_of(RECIPE.inputs)}-{cache.hash_of(LIBRARY)}.so"
+    (tmp_path / name).write_bytes(LIBRARY)
+    return tmp_path / name
+
+
+def test_is_loaded_without_a_compiler_and_whatever_the_tools(shipped: Path) -> None:
+    newer = cache.recipe("a design", "design", [], refuse_to_build, [b"another version of a tool"])
+    assert cache.library_of(RECIPE) == cache.library_of(newer) == shipped
+
+
+@pytest.mark.parametrize("change", [lambda old: old[:-1], lambda old: b"", lambda old: old[::-1]])
+def test_damaged_library_is_not_loaded(shipped: Path, change) -> None:
+    shipped.write_bytes(change(LIBRARY))
+    with pytest.raises(NoCompilerError, match="run: pip install ziglang"):
+        cache.library_of(RECIPE)
+
+
+@pytest.mark.usefixtures("shipped")
+def test_library_of_another_design_is_not_loaded() -> None:
+    with pytest.raises(NoCompilerError):
+        cache.library_of(cache.recipe("a design", "another design", [], refuse_to_build))
+
+
+@pytest.mark.usefixtures("shipped")
+def test_cxx_chooses_a_compiler_over_the_shipped_library(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CXX", "clang++")
+    with pytest.raises(NoCompilerError):
+        cache.library_of(RECIPE)
+
+
+def test_collected_recipes_are_not_built(shipped: Path) -> None:
+    with cache.collected() as recipes, pytest.raises(NoCompilerError, match="only listed"):
+        cache.library_of(RECIPE)
+    assert recipes == [RECIPE]

@@ -3,19 +3,23 @@
 import contextlib
 import fcntl
 import os
+import select
 import socket
 import struct
 import subprocess
 import termios
 import tty
+from typing import Any
 
 import pytest
 
 from cubestack.emulator.ports.endpoint import PortError
+from cubestack.emulator.ports.gdb import GdbEndpoint
 from cubestack.emulator.ports.pseudo_terminal import PtyEndpoint
 from cubestack.emulator.ports.realtime import wait_ready
 from cubestack.emulator.ports.serial_port import MAX_UNSENT
 from cubestack.emulator.ports.tcp import TcpEndpoint
+from tests.emulator.iss.gdb.fake_target import FakeTarget
 
 from .conftest import ALL_BYTES, LOOPBACK, TIMEOUT_S, open_client, ready
 
@@ -328,3 +332,29 @@ def test_tcp_client_that_has_sent_all_still_gets_the_answer(port, device, connec
     assert device.hears(port, 8) == b"question"
     port.exchange(device.advance(20))
     assert client.read(8) == b"question"
+
+
+def test_writing_is_waited_for_while_something_is_unsent() -> None:
+    target: Any = FakeTarget()
+    endpoint = GdbEndpoint(0, target)
+    (server,) = endpoint.watched()
+    assert server[1] == select.POLLIN
+    with socket.create_connection(endpoint.address) as client:
+        endpoint.serve(1.0)
+        assert endpoint.connected
+        assert [events for _, events in endpoint.watched()] == [select.POLLIN] * 2
+        session = endpoint._session
+        assert session is not None
+        session.output.extend(b"+")
+        assert endpoint.watched()[1][1] == select.POLLIN | select.POLLOUT
+        endpoint.exchange(0)
+        assert client.recv(10) == b"+"
+        assert endpoint.watched()[1][1] == select.POLLIN
+    endpoint.close()
+    assert not endpoint.connected
+
+
+@pytest.mark.parametrize("port", [-1, 65_536])
+def test_rejects_invalid_ports(port: int) -> None:
+    with pytest.raises(PortError, match=f"TCP port {port} is not in 0..65535"):
+        GdbEndpoint(port, FakeTarget())  # type: ignore[arg-type]

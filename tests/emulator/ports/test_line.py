@@ -1,11 +1,21 @@
 """The host's end of the line: every byte once, in order, never before its time."""
 
+import errno
+
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from smbus2 import i2c_msg
 
+from cubestack.emulator.bus.i2c import I2cBus, I2cError
 from cubestack.emulator.bus.uart import Uart
-from cubestack.emulator.ports.line import HostLine
-from cubestack.emulator.sim.virtual_time import Kernel
+from cubestack.emulator.i2cdev.direct import DirectI2c
+from cubestack.emulator.ports.line import DirectSerial, HostLine
+from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
+from cubestack.firmware_model.formats.linux_i2c import Call, Ioctl, pack_ioctl, pack_read
+
+from ..bus.ends import Memory
+from .conftest import ALL_BYTES
 
 BYTE = 10_000_000
 
@@ -56,3 +66,119 @@ def test_newer_line_takes_over():
     uart.send(b"y")
     assert older.take(10**12) == b""
     assert newer.take(10**12) == b"xy"
+
+
+@pytest.fixture
+def serial(device) -> DirectSerial:
+    return DirectSerial(device.kernel, device.uart)
+
+
+def test_answer_comes_when_the_wire_delivers_it(device, serial):
+    device.answers = 1
+    serial.write(b"ab")
+    assert serial.read(10, 1.0) == b"a"
+    assert device.kernel.now == 2 * BYTE
+    assert serial.read(10, 1.0) == b"b"
+    assert device.kernel.now == 3 * BYTE
+
+
+def test_read_returns_what_has_arrived_up_to_its_limit(device, serial):
+    device.uart.send(b"abcdef")
+    device.advance(4)
+    assert serial.read(3, 1.0) == b"abc"
+    assert serial.read(3, 1.0) == b"d"
+    assert serial.read(3, 1.0) == b"e"
+    assert device.kernel.now == 5 * BYTE
+
+
+def test_read_times_out_without_data(device, serial):
+    assert serial.read(10, 0.5) == b""
+    assert device.kernel.now == PS_PER_S // 2
+
+
+@pytest.mark.parametrize(("timeout_s", "answer"), [(9e-6, b""), (10e-6, b"x")])
+def test_byte_at_the_timeout(device, serial, timeout_s, answer):
+    device.uart.send(b"x")
+    assert serial.read(10, timeout_s) == answer
+    assert device.kernel.now == round(timeout_s * PS_PER_S)
+
+
+@pytest.mark.parametrize("timeout_s", [0.0, -1.0])
+def test_no_timeout_does_not_wait(device, serial, timeout_s):
+    device.uart.send(b"x")
+    assert serial.read(10, timeout_s) == b""
+    assert device.kernel.now == 0
+    device.advance(1)
+    assert serial.read(10, timeout_s) == b"x"
+
+
+def test_other_events_do_not_end_a_read(device, serial):
+    for time in range(1, 1000):
+        device.kernel.timeout(time * BYTE // 7)
+    device.uart.send(bytes(99))
+    device.kernel.timeout(0).callbacks.append(lambda _event: device.uart.send(b"!"))
+    received = b""
+    while not received.endswith(b"!"):
+        received += serial.read(10, 1.0)
+    assert device.kernel.now == 100 * BYTE
+
+
+def test_closed_link_hears_nothing(device, serial):
+    serial.close()
+    device.uart.send(b"x")
+    assert serial.read(10, 1.0) == b""
+
+
+@pytest.fixture
+def memory() -> Memory:
+    return Memory(refuse=99)
+
+
+@pytest.fixture
+def i2c(memory) -> DirectI2c:
+    kernel = Kernel()
+    bus = I2cBus(kernel)
+    bus.attach(0x1A, memory)
+    return DirectI2c(kernel, bus)
+
+
+def test_smbus2_messages_of_every_byte_value(i2c, memory):
+    write, read = i2c_msg.write(0x1A, [2, 0xAA]), i2c_msg.read(0x1A, 256)
+    i2c.i2c_rdwr(write, read)
+    assert memory.calls == ["write", 2, 0xAA, "read", "stop"]
+    assert (bytes(write), bytes(read), list(read)) == (b"\2\xaa", ALL_BYTES, [*range(256)])
+
+
+def test_bus_works_after_errors_of_the_system(i2c, memory):
+    with pytest.raises(OSError, match="0x30") as raised:
+        i2c.i2c_rdwr(i2c_msg.read(0x30, 1))
+    assert isinstance(raised.value, I2cError)
+    assert raised.value.errno == errno.ENXIO
+    with pytest.raises(I2cError, match="did not acknowledge byte 0x63"):
+        i2c.i2c_rdwr(i2c_msg.write(0x1A, [99]))
+    i2c.i2c_rdwr()  # a bare stop
+    i2c.i2c_rdwr(i2c_msg.write(0x1A, [0, 7]))
+    assert memory.calls[-4:] == ["write", 0, 7, "stop"]
+
+
+def test_ten_bit_addresses_are_refused(i2c):
+    message = i2c_msg.write(0x1A, [1])
+    message.flags |= 0x0010
+    with pytest.raises(OSError, match="flags 0x0010") as raised:
+        i2c.i2c_rdwr(message)
+    assert raised.value.errno == errno.EOPNOTSUPP
+
+
+def test_waiting_passes_virtual_time():
+    kernel = Kernel()
+    DirectI2c(kernel, I2cBus(kernel)).wait(0.25)
+    assert kernel.now == PS_PER_S // 4
+
+
+def test_calls_of_a_device_file(i2c, memory):
+    assert i2c.call(Call.IOCTL, pack_ioctl(Ioctl.SLAVE, 0x1A)) == (0, b"")
+    assert i2c.call(Call.WRITE, b"\x02") == (1, b"")
+    assert i2c.call(Call.READ, pack_read(3)) == (3, b"\x00\x01\x02")
+    assert i2c.call(Call.IOCTL, pack_ioctl(Ioctl.SLAVE, 0x30)) == (0, b"")
+    assert i2c.call(Call.READ, pack_read(3)) == (-errno.ENXIO, b"")
+    i2c.close()

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cubestack.emulator.rtl.benchmark import RepeatedFrame
 from cubestack.emulator.rtl.pixel_clock import LoadedSegment
-from cubestack.emulator.rtl.repeated_frame import RepeatedFrame
 
 IMAGE = np.arange(1, 13, dtype=np.uint8).reshape(3, 4)
 

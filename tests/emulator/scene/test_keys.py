@@ -1,5 +1,6 @@
 """What is described of the keys of scene files is what loading a file takes."""
 
+import tomllib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -10,9 +11,8 @@ import pytest
 from cubestack.emulator.camera.common.scene_file import load_scene, sky_keys
 from cubestack.emulator.camera.mlx75412.lens import CONDITION, LENS, UNCERTAIN
 from cubestack.emulator.camera.ov7620.scene_file import earth_sun_keys, load_earth_sun_scene
-from cubestack.emulator.scene.file import SceneError
+from cubestack.emulator.scene.file import SceneError, toml_text
 from cubestack.emulator.scene.hazards import EARTH_HAZARDS, SKY_HAZARDS
-from cubestack.emulator.scene.toml_text import toml_text
 
 KINDS = {**sky_keys(CONDITION, UNCERTAIN), **earth_sun_keys()}
 BASE: dict[str, dict[str, Any]] = {
@@ -149,3 +149,31 @@ def test_every_key_has_a_meaning_and_a_type() -> None:
     assert set(KINDS["sky"]["hazards"]["kinds"]) >= set(SKY_HAZARDS)
     assert set(KINDS["earth-sun"]["hazards"]["kinds"]) >= {*SKY_HAZARDS, *EARTH_HAZARDS}
     assert not set(SKY_HAZARDS) & set(KINDS["picture"]["hazards"]["kinds"])
+
+
+@pytest.mark.parametrize(
+    "table",
+    [
+        {},
+        {"kind": "sky", "ra_deg": 83.8, "count": -3, "noise": False, "list": [1, 2.5]},
+        {"small": 1e-7, "large": 1e300, "pairs": [[40.0, 0.1], [70.0, 0.4]], "none": []},
+        {"atmosphere": {"latitude_deg": -33.9}, "after": 1},
+        {"poses": [{"at_s": 1.0, "rate_deg_s": [0.0, 1.0, 0.0]}, {"at_s": 2.0}]},
+        {"hazards": {"sun-glare": [{"direction": [1.0, 2.0]}], "moon": {"scatter": 0.1}}},
+        {"empty": {}, "key with blanks": {'"quoted"': 1}, "line\nend": 2},
+        {"text": 'quotes " and \\ and \x00 \x7f \n é 😀 ]\n[hazards]'},
+    ],
+)
+def test_it_reads_as_the_same_table(table: dict[str, Any]) -> None:
+    assert tomllib.loads(toml_text(table)) == table
+
+
+def test_a_moment_becomes_one() -> None:
+    (moment,) = tomllib.loads(toml_text({"utc": "2013-02-01T20:00:00Z"})).values()
+    assert moment.isoformat() == "2013-02-01T20:00:00+00:00"
+
+
+@pytest.mark.parametrize("value", [None, float("inf"), float("nan"), object(), [None], [{}, 1]])
+def test_rejects_values_that_toml_cannot_store(value: Any) -> None:
+    with pytest.raises(SceneError, match="a scene file can not contain the value"):
+        toml_text({"key": value})

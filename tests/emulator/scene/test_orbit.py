@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from sgp4.api import WGS72, Satrec
 
-from cubestack.emulator.scene.angles import angles_from_vector
 from cubestack.emulator.scene.attitude import (
+    angles_from_vector,
     matrix_from_quaternion,
     propagate,
     quaternion_from_pointing,

@@ -2,8 +2,8 @@
 
 import pytest
 
-from cubestack.emulator.boards.cubesense.power import CUBESENSE_POWER
-from cubestack.emulator.boards.cubestar.power import CUBESTAR_POWER
+from cubestack.emulator.boards.cubesense.board import CUBESENSE_POWER
+from cubestack.emulator.boards.cubestar.layouts import CUBESTAR_POWER
 from cubestack.emulator.sim.power import COMPARATOR_US, PowerModel
 from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_US, Kernel
 

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from cubestack.emulator.native.compiler import find_compiler
+from cubestack.emulator.rtl.benchmark import RepeatedFrame
 from cubestack.emulator.rtl.contract import RtlEngine
 from cubestack.emulator.rtl.cxxrtl.clock_steps import clock_steps
 from cubestack.emulator.rtl.cxxrtl.variants import members, variant_text
 from cubestack.emulator.rtl.factory import make_engine
-from cubestack.emulator.rtl.repeated_frame import RepeatedFrame
 from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.hdl.flow.generate import rtlil_text
 from tests.benchmarks.engines.workloads import WORKLOADS

@@ -9,8 +9,11 @@ import pytest
 
 from cubestack.emulator.camera.common.view import View
 from cubestack.emulator.native.compiler import find_compiler
-from cubestack.emulator.scene.angles import angles_from_vector
-from cubestack.emulator.scene.attitude import attitude_error_deg, quaternion_from_matrix
+from cubestack.emulator.scene.attitude import (
+    angles_from_vector,
+    attitude_error_deg,
+    quaternion_from_matrix,
+)
 from cubestack.emulator.scene.earth_sun import CameraTarget, Mounting
 from cubestack.emulator.scene.orbit import Inertial
 from cubestack.emulator.scene.orbit_file import load_orbit

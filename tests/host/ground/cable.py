@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from cubestack.emulator.bus.line_format import LineFormat, LineSampler
-from cubestack.emulator.ports.terminal_settings import line_format, read_settings
+from cubestack.emulator.ports.pseudo_terminal import line_format, read_settings
 from cubestack.firmware_model.formats.recording import load_recording
 from cubestack.firmware_model.interface.codec.message import Interface, MessageKind
 from cubestack.host.errors import PortClosedError

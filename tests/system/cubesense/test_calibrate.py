@@ -7,7 +7,7 @@ from PIL import Image
 
 from cubestack.emulator.camera.ov7620.fisheye import lens_of
 from cubestack.emulator.camera.ov7620.lens_error import LensError, draw_lens
-from cubestack.emulator.scene.angles import vector_from_angles
+from cubestack.emulator.scene.attitude import vector_from_angles
 from cubestack.emulator.scene.earth_sun import CameraTarget
 from cubestack.host.cli.main import main
 

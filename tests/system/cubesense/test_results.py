@@ -7,7 +7,7 @@ import pytest
 from cubestack.emulator.camera.ov7620.fisheye import LENSES
 from cubestack.emulator.camera.ov7620.lens_error import NOMINAL, LensError, draw_lens
 from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
-from cubestack.emulator.scene.angles import angles_from_vector, vector_from_angles
+from cubestack.emulator.scene.attitude import angles_from_vector, vector_from_angles
 from cubestack.emulator.scene.earth_sun import CameraTarget, EarthSunScene, Reflection
 from cubestack.firmware_model.interface.cubesense.codes import (
     Camera,

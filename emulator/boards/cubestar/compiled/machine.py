@@ -6,7 +6,7 @@ of the external bus). All times are in core cycles, so the clock frequency does 
 
 from dataclasses import dataclass
 
-from cubestack.emulator.boards.processor_registers import find_instance
+from cubestack.emulator.boards.monitor import find_instance
 from cubestack.emulator.iss.calls import Calls
 from cubestack.emulator.iss.image import Image
 from cubestack.emulator.iss.machine import EXTERNAL_BASE, Machine

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from cubestack.emulator.boards.aramis.ppi import Ppi
+from cubestack.emulator.camera.common.image_sensor import StreamSegment
 from cubestack.emulator.camera.common.shutter import RollingShutter
-from cubestack.emulator.camera.common.stream import StreamSegment
 from cubestack.emulator.camera.mt9m001.lens import CONDITION
 from cubestack.emulator.camera.mt9m001.sensor import Mt9m001
 from cubestack.emulator.scene.sky import SkyScene

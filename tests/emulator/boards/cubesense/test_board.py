@@ -4,16 +4,18 @@ A tiny program stands in for the firmware where only wires matter.
 """
 
 from collections.abc import Iterator
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from cubestack.emulator.boards.cubesense.board import BOOT_US, CubeSenseBoard
-from cubestack.emulator.boards.cubesense.gpio import CHANNELS, GpioPins
+from cubestack.emulator.boards.cubesense.processor import CHANNELS, GpioPins
 from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
 from cubestack.emulator.native.compiler import find_compiler
 from cubestack.emulator.scene.earth_sun import EarthSunScene
-from cubestack.emulator.sim.virtual_time import PS_PER_MS
+from cubestack.emulator.sim.virtual_time import PS_PER_MS, Kernel
 from cubestack.firmware_model.cubesense.hardware import Port
 from cubestack.firmware_model.interface.cubesense import pins
 from cubestack.firmware_model.interface.cubesense.codes import Camera, Sram
@@ -191,3 +193,27 @@ def test_lines_are_open_drain(board: CubeSenseBoard) -> None:
     assert (lines.get_pin(sda), lines.get_pin(scl)) == (0, 1)
     lines.release()
     assert (lines.get_pin(sda), lines.get_pin(scl)) == (1, 1)
+
+
+def test_a_reset_lets_control_lines_rise_and_switches_everything_off() -> None:
+    lines: dict[tuple[Camera, str], int] = {}
+    switched: dict[str, bool] = {}
+
+    def camera(which: Camera) -> Any:
+        return SimpleNamespace(
+            on_pin=lambda line, level, _now_ps: lines.update({(which, line): level})
+        )
+
+    power: Any = SimpleNamespace(switch=switched.__setitem__)
+    driven = GpioPins(Kernel(), {which: camera(which) for which in Camera}, power)
+    high = {(which, line): 1 for which in Camera for line in ("SCL", "SDA")}
+    off = dict.fromkeys(CHANNELS.values(), False)
+    assert (lines, switched) == (high, off)
+    for pin in (*pins.CAMERA_SCL.values(), *pins.CAMERA_SDA.values()):
+        driven.set_pin(pin, 0)
+    for pin in CHANNELS:
+        driven.set_pin(pin, 1)
+    assert set(lines.values()) == {0}
+    assert set(switched.values()) == {True}
+    driven.release()
+    assert (lines, switched) == (high, off)

@@ -4,8 +4,13 @@ from itertools import product
 
 import pytest
 
-from cubestack.emulator.boards.cubestar.layouts import BOARDS, Fpga, LayoutBoard, fpga_of
-from cubestack.emulator.boards.cubestar.power import CUBESTAR_POWER
+from cubestack.emulator.boards.cubestar.layouts import (
+    BOARDS,
+    CUBESTAR_POWER,
+    Fpga,
+    LayoutBoard,
+    fpga_of,
+)
 from cubestack.emulator.sim.power import PowerModel
 from cubestack.emulator.sim.virtual_time import Kernel
 from cubestack.firmware_model.interface.cubestar.pins import Layout

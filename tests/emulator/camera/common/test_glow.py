@@ -12,7 +12,7 @@ from cubestack.emulator.camera.mt9m001.lens import double_gauss
 from cubestack.emulator.scene.hazards import SKY_HAZARDS, Moon, SunGlare
 from cubestack.emulator.scene.hazards.contract import SkyHazard
 from cubestack.emulator.scene.sky import SkyScene
-from tests.emulator.scene.hazards.looks import ORION, SHUTTER
+from tests.emulator.scene.hazards.around import ORION, SHUTTER
 from tests.tiers import quick
 
 LENSES = [LENS, double_gauss()]

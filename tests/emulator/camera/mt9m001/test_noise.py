@@ -9,20 +9,19 @@ import pytest
 from cubestack.emulator.camera.common.dark import hot_pixels
 from cubestack.emulator.camera.common.register_file import RegisterFile
 from cubestack.emulator.camera.common.view import SkyCondition
-from cubestack.emulator.camera.mt9m001 import noise
-from cubestack.emulator.camera.mt9m001.imager import Mt9m001Imager
+from cubestack.emulator.camera.mt9m001 import imager
 from cubestack.emulator.camera.mt9m001.lens import CONDITION
 from cubestack.emulator.camera.mt9m001.registers import read_settings
 from cubestack.firmware_model.interface.cameras.mt9m001 import REGISTERS
 
 SHAPE = (400, 500)
 QUIET = replace(CONDITION, hot_pixels=0)
-LSB8 = noise.FULL_WELL_ELECTRONS / 256  # electrons of a count of 8 bits at gain 1
+LSB8 = imager.FULL_WELL_ELECTRONS / 256  # electrons of a count of 8 bits at gain 1
 
 
 def frame(
     light: float | np.ndarray,
-    terms: noise.NoiseTerms,
+    terms: imager.NoiseTerms,
     gain: float = 1.0,
     condition: SkyCondition = QUIET,
     background: float = 15.0,
@@ -30,8 +29,8 @@ def frame(
     electrons = np.broadcast_to(np.float32(light), SHAPE)
     generator = np.random.Generator(np.random.SFC64(1))
     settings = replace(read_settings(RegisterFile(REGISTERS)), gains=(gain,) * 4)
-    imager = Mt9m001Imager(0, terms, background)
-    return imager.counts(electrons, 1.0, condition, settings, generator)
+    made = imager.Mt9m001Imager(0, terms, background)
+    return made.counts(electrons, 1.0, condition, settings, generator)
 
 
 def quantisation_sigma(gain: float = 1.0) -> float:
@@ -39,9 +38,9 @@ def quantisation_sigma(gain: float = 1.0) -> float:
     return LSB8 / gain / np.sqrt(12)
 
 
-def only(**terms: bool) -> noise.NoiseTerms:
+def only(**terms: bool) -> imager.NoiseTerms:
     names = ("shot", "dark", "background", "quantisation", "readout")
-    return noise.NoiseTerms(**(dict.fromkeys(names, False) | terms))
+    return imager.NoiseTerms(**(dict.fromkeys(names, False) | terms))
 
 
 def electrons_sigma(picture: np.ndarray, gain: float = 1.0) -> float:
@@ -49,14 +48,14 @@ def electrons_sigma(picture: np.ndarray, gain: float = 1.0) -> float:
 
 
 def test_the_data_sheet_s_ratios_come_out() -> None:
-    assert 20 * np.log10(np.sqrt(noise.FULL_WELL_ELECTRONS)) == pytest.approx(45)
-    ratio = noise.FULL_WELL_ELECTRONS / noise.READ_NOISE_ELECTRONS
+    assert 20 * np.log10(np.sqrt(imager.FULL_WELL_ELECTRONS)) == pytest.approx(45)
+    ratio = imager.FULL_WELL_ELECTRONS / imager.READ_NOISE_ELECTRONS
     assert 20 * np.log10(ratio) == pytest.approx(68.2)
 
 
 def test_without_noise_there_is_one_value() -> None:
-    picture = frame(10_000, noise.NoiseTerms.none())
-    expected = 10_000 / LSB8 + noise.BLACK_LEVEL / 4
+    picture = frame(10_000, imager.NoiseTerms.none())
+    expected = 10_000 / LSB8 + imager.BLACK_LEVEL / 4
     assert np.unique(picture).tolist() == [int(expected + 0.5)]
 
 
@@ -65,7 +64,7 @@ def test_without_noise_there_is_one_value() -> None:
     [
         ("shot", 4_000, 1.0, np.sqrt(4_000)),
         ("shot", 25_000, 1.0, np.sqrt(25_000)),
-        ("readout", 2_000, 8.0, noise.READ_NOISE_ELECTRONS),
+        ("readout", 2_000, 8.0, imager.READ_NOISE_ELECTRONS),
     ],
 )
 def test_one_term(term: str, light: float, gain: float, sigma: float) -> None:
@@ -74,9 +73,9 @@ def test_one_term(term: str, light: float, gain: float, sigma: float) -> None:
 
 
 def test_dark_current_doubles_and_leaves_its_noise_but_not_its_mean() -> None:
-    assert noise.dark_electrons_per_s(33) / noise.dark_electrons_per_s(25) == pytest.approx(2)
+    assert imager.dark_electrons_per_s(33) / imager.dark_electrons_per_s(25) == pytest.approx(2)
     gain, warm = 8.0, 65.0
-    dark = noise.dark_electrons_per_s(warm)
+    dark = imager.dark_electrons_per_s(warm)
     condition = replace(QUIET, temperature_c=warm)
     picture = frame(1_500, only(dark=True), gain, condition)
     rounding = quantisation_sigma(gain)
@@ -98,8 +97,8 @@ def test_quantisation_follows_its_formula() -> None:
     rng = np.random.default_rng(2)
     light = rng.uniform(5_000, 25_000, SHAPE).astype(np.float32)
 
-    def error(terms: noise.NoiseTerms) -> np.ndarray:
-        return light - (frame(light, terms) - noise.BLACK_LEVEL / 4) * LSB8
+    def error(terms: imager.NoiseTerms) -> np.ndarray:
+        return light - (frame(light, terms) - imager.BLACK_LEVEL / 4) * LSB8
 
     wired = error(only(quantisation=True))
     # The upper 8 of 10 bits: the error of 8 bits, and on the average what is cut off.
@@ -113,26 +112,26 @@ def test_the_wires_values_end_at_0_and_255(quantisation: bool, least_of_one: flo
     """At this gain the noise of a dark pixel often goes below what is 1, of 8 bits."""
     gain = 15.0
     light = np.zeros(SHAPE)
-    light[SHAPE[0] // 2 :] = 2 * noise.FULL_WELL_ELECTRONS
+    light[SHAPE[0] // 2 :] = 2 * imager.FULL_WELL_ELECTRONS
     dark, bright = np.split(frame(light, only(readout=True, quantisation=quantisation), gain), 2)
-    counts = NormalDist(noise.BLACK_LEVEL / 4, noise.READ_NOISE_ELECTRONS * gain / LSB8)
+    counts = NormalDist(imager.BLACK_LEVEL / 4, imager.READ_NOISE_ELECTRONS * gain / LSB8)
     assert (dark == 0).mean() == pytest.approx(counts.cdf(least_of_one), abs=0.01)
     assert (bright == 255).all()
 
 
 def test_the_terms_add_up_as_variances() -> None:
     light, gain, background = 800.0, 8.0, 15.0
-    variance = light + noise.dark_electrons_per_s(20.0) + background
-    variance += noise.READ_NOISE_ELECTRONS**2 + quantisation_sigma(gain) ** 2
-    measured = electrons_sigma(frame(light, noise.NoiseTerms(), gain), gain)
+    variance = light + imager.dark_electrons_per_s(20.0) + background
+    variance += imager.READ_NOISE_ELECTRONS**2 + quantisation_sigma(gain) ** 2
+    measured = electrons_sigma(frame(light, imager.NoiseTerms(), gain), gain)
     assert measured == pytest.approx(np.sqrt(variance), rel=0.02)
 
 
 def test_hot_pixels_shine_where_they_are_and_scale_with_the_dark_current() -> None:
-    places, shares = hot_pixels(7, 10, SHAPE[0] * SHAPE[1], noise.HOT_SHARE)
+    places, shares = hot_pixels(7, 10, SHAPE[0] * SHAPE[1], imager.HOT_SHARE)
     picture = frame(0, only(dark=True), condition=replace(CONDITION, hot_pixels=10, seed=7))
     bright = set(np.flatnonzero(picture > 10).tolist())
-    strong = set(places[shares * noise.dark_electrons_per_s(20.0) > 12 * LSB8].tolist())
+    strong = set(places[shares * imager.dark_electrons_per_s(20.0) > 12 * LSB8].tolist())
     assert strong
     assert strong <= bright <= set(places.tolist())
     repeated = hot_pixels.__wrapped__(7, 10, SHAPE[0] * SHAPE[1])

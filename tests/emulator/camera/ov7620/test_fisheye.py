@@ -3,7 +3,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from cubestack.emulator.camera.ov7620 import fisheye
-from cubestack.emulator.scene.angles import angles_from_vector, vector_from_angles
+from cubestack.emulator.scene.attitude import angles_from_vector, vector_from_angles
 from cubestack.emulator.scene.earth_sun import CameraTarget
 from cubestack.firmware_model.interface.cubesense import codes
 

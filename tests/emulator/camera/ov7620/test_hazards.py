@@ -15,9 +15,9 @@ from cubestack.emulator.camera.common.hazards import (
     Protons,
 )
 from cubestack.emulator.camera.common.hazards.contract import SensorHazard
-from cubestack.emulator.camera.ov7620.blur import blur
 from cubestack.emulator.camera.ov7620.fisheye import lens_of
 from cubestack.emulator.camera.ov7620.lens_error import NOMINAL
+from cubestack.emulator.camera.ov7620.light import blur
 from cubestack.emulator.camera.ov7620.sensor import Ov7620
 from cubestack.emulator.camera.ov7620.view import FisheyeCondition
 from cubestack.emulator.scene.earth_sun import CameraTarget, EarthSunScene

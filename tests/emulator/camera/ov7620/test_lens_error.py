@@ -9,7 +9,7 @@ from cubestack.emulator.camera.ov7620.lens_error import (
     LensError,
     draw_lens,
 )
-from cubestack.emulator.scene.angles import angles_from_vector, vector_from_angles
+from cubestack.emulator.scene.attitude import angles_from_vector, vector_from_angles
 from cubestack.emulator.scene.earth_sun import CameraTarget
 from cubestack.emulator.scene.file import SceneError
 

@@ -1,10 +1,15 @@
 """Integrals of a hazard's glow over parts of the sky."""
 
 import math
+from fractions import Fraction
 
 import numpy as np
 
+from cubestack.emulator.camera.common.exposure import camera_state_for
+from cubestack.emulator.camera.common.shutter import RollingShutter
+from cubestack.emulator.camera.mlx75412.lens import LENS
 from cubestack.emulator.scene.hazards.contract import CameraState, SkyHazard
+from cubestack.emulator.scene.sky import SkyScene
 
 
 def whole_light(hazard: SkyHazard, now: CameraState, centre: np.ndarray, reach_rad: float) -> float:
@@ -22,3 +27,8 @@ def whole_light(hazard: SkyHazard, now: CameraState, centre: np.ndarray, reach_r
     assert glow is not None
     area = 2 * math.pi * (1 - math.cos(reach_rad))
     return float(glow.mean(dtype=np.float64)) * area
+
+
+SHUTTER = RollingShutter(10**12, Fraction(132_200_000), 2917, 2917)
+ORION = SkyScene.pointing(83.8, -1.0)
+NOW = camera_state_for(ORION.quaternion, LENS)

@@ -1,6 +1,7 @@
 """Directions that scenes name, and where hazards are placed."""
 
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -16,7 +17,9 @@ from cubestack.emulator.scene.hazards.contract import (
     direction,
     random_direction_at,
 )
+from cubestack.emulator.scene.hazards.hazard import Hazard, Strength
 from cubestack.emulator.scene.hazards.moon import Moon
+from cubestack.firmware_model.values import number, whole
 
 AXES = Rotation.from_euler("zyx", [50, -20, 10], degrees=True).as_matrix()
 ROUND = CameraState(AXES, 40, 20, 15, 1e-3)
@@ -117,3 +120,22 @@ def test_plain_hazard_has_no_effect() -> None:
 def test_the_earth_s_radiance_is_that_of_its_albedo() -> None:
     """0.3 of the Sun's light on a Lambert surface, by pi; the Sun is V -26.74."""
     assert np.pi * EARTH_RADIANCE / 10 ** (0.4 * 26.74) == pytest.approx(0.3)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fog(Hazard):
+    name: ClassVar[str] = "fog"
+    meaning: ClassVar[str] = "water in the air"
+    strength: ClassVar[Strength] = Strength("banks", "", (0, 3))
+
+    banks: int = whole(1, "number of banks", 0, 9)
+    depth_m: float | None = number(None, "depth of each", 0, 50)
+    kind: str = "sea"
+
+
+def test_one_of_a_strength_has_a_seed_of_its_own_that_repeats() -> None:
+    first, again = (Fog.sample(3.0, None, np.random.default_rng(5)) for _ in range(2))
+    assert first == again
+    assert first.banks == 3
+    assert isinstance(first.banks, int)
+    assert first.seed != Fog.sample(3.0, None, np.random.default_rng(6)).seed

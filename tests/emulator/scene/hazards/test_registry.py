@@ -12,7 +12,7 @@ from cubestack.emulator.scene.file import SceneError
 from cubestack.emulator.scene.hazards import SKY_HAZARDS
 from cubestack.emulator.scene.hazards.contract import SkyHazard
 from cubestack.emulator.scene.sky import SkyScene
-from tests.emulator.scene.hazards.looks import NOW, ORION, SHUTTER
+from tests.emulator.scene.hazards.around import NOW, ORION, SHUTTER
 from tests.tiers import quick
 
 KINDS = list(SKY_HAZARDS.values())

@@ -10,7 +10,7 @@ from cubestack.emulator.scene.hazards.sky_glow import (
     milky_way,
     zodiacal,
 )
-from tests.emulator.scene.hazards.looks import NOW
+from tests.emulator.scene.hazards.around import NOW
 
 TABLE_16 = """\
 - - - 2450 1260 770 500 215 117 78

@@ -18,7 +18,7 @@ from cubestack.emulator.boards.cubestar.compiled.build import (
     rewrite_source,
 )
 from cubestack.emulator.boards.cubestar.compiled.machine import Timing, start_program
-from cubestack.emulator.boards.processor_registers import peek
+from cubestack.emulator.boards.monitor import peek
 from cubestack.emulator.iss.calls import CallError, Calls
 from cubestack.emulator.iss.insight.symbols import Symbols
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3, load_measurements
