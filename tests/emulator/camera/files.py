@@ -1,4 +1,4 @@
-"""Scene files that tests write."""
+"""Scene files that tests write, and segments as an engine requests them of a camera."""
 
 from collections.abc import Callable
 from pathlib import Path
