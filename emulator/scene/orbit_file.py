@@ -22,46 +22,26 @@ from typing import Any
 
 from sgp4.api import Satrec
 
+from cubestack.emulator.scene import orbit
 from cubestack.emulator.scene.attitude import ANGLES, quaternion_from_pointing
 from cubestack.emulator.scene.earth_sun import Mounting
 from cubestack.emulator.scene.file import SceneError, read_file
-from cubestack.emulator.scene.orbit import (
-    Attitude,
-    Inertial,
-    NadirPointing,
-    Orbit,
-    Waypoints,
-    circular,
-)
-from cubestack.firmware_model.values import (
-    REQUIRED,
-    TABLE,
-    TEXT,
-    Declaration,
-    ListDeclaration,
-    TableDeclaration,
-    flag,
-    moment,
-    number,
-    read_table,
-    table,
-    vector,
-)
+from cubestack.firmware_model import values as declare
 
 
-def load_orbit(path: Path) -> Orbit:
+def load_orbit(path: Path) -> orbit.Orbit:
     """Read an orbit file; SceneError names the file and the wrong key."""
     return read_file(path, _orbit)
 
 
-def _orbit(given: dict[str, Any]) -> Orbit:
-    values = read_table(given, _KEYS)
+def _orbit(given: dict[str, Any]) -> orbit.Orbit:
+    values = declare.read_table(given, _KEYS)
     lines, elements = values.pop("tle", None), values.pop("circular", None)
     if (lines is None) == (elements is None):
         raise SceneError("needs either tle, or the table circular")
     if lines is not None:
-        return Orbit(lines, **values)
-    return Orbit(circular(values["start"], **{"along_deg": 0.0} | elements), **values)
+        return orbit.Orbit(lines, **values)
+    return orbit.Orbit(orbit.circular(values["start"], **{"along_deg": 0.0} | elements), **values)
 
 
 def _start(found: datetime) -> datetime:
@@ -89,63 +69,74 @@ def _lines(value: tuple[str, str]) -> Satrec:
     return satellite
 
 
-_QUATERNION = vector(4, REQUIRED, "ICRS to body, scalar last")
-_POINT = {"at_s": number(REQUIRED, "after the start", 0, 1e9), "quaternion": _QUATERNION}
+_QUATERNION = declare.vector(4, declare.REQUIRED, "ICRS to body, scalar last")
+_POINT = {
+    "at_s": declare.number(declare.REQUIRED, "after the start", 0, 1e9),
+    "quaternion": _QUATERNION,
+}
 
 
-def _inertial(pose: dict[str, Any]) -> Attitude:
+def _inertial(pose: dict[str, Any]) -> orbit.Attitude:
     ra, dec, roll = (pose.pop(key, None) for key in ANGLES)
     if ("quaternion" in pose) == (ra is not None) or (ra is None) != (dec is None):
         raise SceneError("attitude needs either quaternion, or ra_deg and dec_deg")
     if ra is not None:
         pose["quaternion"] = tuple(quaternion_from_pointing(ra, dec, roll or 0.0).tolist())
-    return Inertial(**pose)
+    return orbit.Inertial(**pose)
 
 
-_ATTITUDES: dict[str, TableDeclaration] = {
-    "nadir": table(None, "body z to the Earth's centre", NadirPointing),
-    "inertial": table(
-        None, "a fixed attitude or body rate", {**ANGLES, **Inertial.declared()}, _inertial
+_ATTITUDES: dict[str, declare.TableDeclaration] = {
+    "nadir": declare.table(None, "body z to the Earth's centre", orbit.NadirPointing),
+    "inertial": declare.table(
+        None, "a fixed attitude or body rate", {**ANGLES, **orbit.Inertial.declared()}, _inertial
     ),
-    "waypoints": table(
+    "waypoints": declare.table(
         None,
         "quaternions at given times",
-        {"points": table(REQUIRED, "in order of time", _POINT, array=True)},
-        lambda values: Waypoints(tuple((p["at_s"], p["quaternion"]) for p in values["points"])),
+        {"points": declare.table(declare.REQUIRED, "in order of time", _POINT, array=True)},
+        lambda values: orbit.Waypoints(
+            tuple((p["at_s"], p["quaternion"]) for p in values["points"])
+        ),
     ),
 }
 
 
-def _attitude(given: dict[str, Any]) -> Attitude:
+def _attitude(given: dict[str, Any]) -> orbit.Attitude:
     values = dict(given)
     kind = values.pop("kind", None)
     if kind not in _ATTITUDES:
         raise SceneError(f"kind must be one of {', '.join(_ATTITUDES)}")
-    attitude: Attitude = _ATTITUDES[kind].read(values)
+    attitude: orbit.Attitude = _ATTITUDES[kind].read(values)
     return attitude
 
 
 def _mountings(given: dict[str, Any]) -> dict[str, Mounting]:
-    mounting = table(None, "of the camera of a device", Mounting)
-    return read_table(given, dict.fromkeys(given, mounting))
+    mounting = declare.table(None, "of the camera of a device", Mounting)
+    return declare.read_table(given, dict.fromkeys(given, mounting))
 
 
 _KEYS = {
-    "start": moment(REQUIRED, "virtual time 0", make=_start),
-    "tle": ListDeclaration(
-        part=Declaration(kind=TEXT), count=2, default=None, meaning="elements", make=_lines
+    "start": declare.moment(declare.REQUIRED, "virtual time 0", make=_start),
+    "tle": declare.ListDeclaration(
+        part=declare.Declaration(kind=declare.TEXT),
+        count=2,
+        default=None,
+        meaning="elements",
+        make=_lines,
     ),
-    "circular": table(
+    "circular": declare.table(
         None,
         "a circular orbit instead of elements",
         {
-            "altitude_km": number(REQUIRED, "above the Earth", 160, 40_000),
-            "inclination_deg": number(REQUIRED, "of the orbit", 0, 180),
-            "node_deg": number(REQUIRED, "right ascension of the ascending node", -360, 360),
-            "along_deg": number(0.0, "angle from the node at the start", -360, 360),
+            "altitude_km": declare.number(declare.REQUIRED, "above the Earth", 160, 40_000),
+            "inclination_deg": declare.number(declare.REQUIRED, "of the orbit", 0, 180),
+            "node_deg": declare.number(
+                declare.REQUIRED, "right ascension of the ascending node", -360, 360
+            ),
+            "along_deg": declare.number(0.0, "angle from the node at the start", -360, 360),
         },
     ),
-    "hazards": flag(True, "Earth, Sun and Moon disturb cameras that look at the sky"),
-    "attitude": Declaration(kind=TABLE, default=None, make=_attitude),
-    "mountings": Declaration(kind=TABLE, default=None, make=_mountings),
+    "hazards": declare.flag(True, "Earth, Sun and Moon disturb cameras that look at the sky"),
+    "attitude": declare.Declaration(kind=declare.TABLE, default=None, make=_attitude),
+    "mountings": declare.Declaration(kind=declare.TABLE, default=None, make=_mountings),
 }

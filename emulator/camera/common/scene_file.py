@@ -43,19 +43,7 @@ from cubestack.emulator.scene.hazards import SKY_HAZARDS
 from cubestack.emulator.scene.hazards.contract import SkyHazard
 from cubestack.emulator.scene.hazards.hazard import Hazard, HazardTables
 from cubestack.emulator.scene.sky import PictureScene, Pose, SkyScene
-from cubestack.firmware_model.values import (
-    REQUIRED,
-    Keys,
-    choice,
-    described,
-    moment,
-    number,
-    read_table,
-    table,
-    text,
-    vector,
-    whole,
-)
+from cubestack.firmware_model import values as declare
 
 
 def load_scene(
@@ -78,22 +66,22 @@ def hazard_tables(kinds: Mapping[str, type[Hazard]], seed: int = 0) -> HazardTab
     return HazardTables(kinds={**kinds, **SENSOR_HAZARDS}, seed=seed)
 
 
-def _with_defaults(keys: Keys, owner: Any) -> Keys:
+def _with_defaults(keys: declare.Keys, owner: Any) -> declare.Keys:
     return {name: replace(one, default=getattr(owner, name)) for name, one in keys.items()}
 
 
 #: Keys of the table "optics"; the device gives the sensor's size.
-_OPTICS: Keys = {
+_OPTICS: declare.Keys = {
     name: one for name, one in Optics.declared().items() if name not in ("columns", "rows")
 }
-_ATTITUDE: Keys = {
+_ATTITUDE: declare.Keys = {
     **ANGLES,
-    "quaternion": vector(
+    "quaternion": declare.vector(
         4, None, "attitude, inertial to camera, scalar last; or the angles", instead=tuple(ANGLES)
     ),
 }
-_LATER: Keys = {**_ATTITUDE, **Pose.declared()}
-_POSE: Keys = {name: one for name, one in _LATER.items() if name != "at_s"}
+_LATER: declare.Keys = {**_ATTITUDE, **Pose.declared()}
+_POSE: declare.Keys = {name: one for name, one in _LATER.items() if name != "at_s"}
 
 
 def _atmosphere(values: dict[str, Any]) -> Atmosphere:
@@ -105,15 +93,17 @@ def _atmosphere(values: dict[str, Any]) -> Atmosphere:
     return Atmosphere(**values)
 
 
-_AIR: Keys = {
+_AIR: declare.Keys = {
     **Atmosphere.declared(),
     "sidereal_deg": replace(Atmosphere.declared()["sidereal_deg"], default=None),
-    "longitude_deg": number(None, "of the observer, east positive; with utc"),
-    "utc": moment(None, "date and time at time 0; with longitude_deg"),
+    "longitude_deg": declare.number(None, "of the observer, east positive; with utc"),
+    "utc": declare.moment(None, "date and time at time 0; with longitude_deg"),
 }
 
 
-def _sky_keys(condition: SkyCondition, uncertain: Mapping[str, float], seed: int = 0) -> Keys:
+def _sky_keys(
+    condition: SkyCondition, uncertain: Mapping[str, float], seed: int = 0
+) -> declare.Keys:
     """Arguments as of `load_scene`; ``seed`` as of `hazard_tables`."""
 
     def lens(values: dict[str, Any]) -> Optics:
@@ -122,27 +112,29 @@ def _sky_keys(condition: SkyCondition, uncertain: Mapping[str, float], seed: int
             draw_optics(optics, uncertain, drawn) if drawn is not None else optics, **values
         )
 
-    drawn = whole(None, "seed of a lens that differs from its calibration", 0)
+    drawn = declare.whole(None, "seed of a lens that differs from its calibration", 0)
     optics = {**_with_defaults(_OPTICS, condition.optics), "drawn": drawn}
     return {
         **_POSE,
-        "mount": choice(
+        "mount": declare.choice(
             False, "earth: the camera turns with the Earth", {"sky": False, "earth": True}
         ),
-        "poses": table((), "later poses, in order of time", _LATER, array=True),
-        "atmosphere": table(None, "the atmosphere between camera and stars", _AIR, _atmosphere),
+        "poses": declare.table((), "later poses, in order of time", _LATER, array=True),
+        "atmosphere": declare.table(
+            None, "the atmosphere between camera and stars", _AIR, _atmosphere
+        ),
         **SkyScene.declared(),
         **_with_defaults(SkyCondition.declared(), condition),
-        "seed": whole(0, "of noise, atmosphere, false stars and hot pixels", 0),
-        "optics": table(None, "values of the lens that differ", optics, lens),
+        "seed": declare.whole(0, "of noise, atmosphere, false stars and hot pixels", 0),
+        "optics": declare.table(None, "values of the lens that differ", optics, lens),
         "hazards": hazard_tables(SKY_HAZARDS, seed),
     }
 
 
-def _picture_keys(condition: SkyCondition) -> Keys:
+def _picture_keys(condition: SkyCondition) -> declare.Keys:
     temperature = {"temperature_c": SkyCondition.declared()["temperature_c"]}
     return {
-        "file": text(REQUIRED, "PNG, JPEG or TIFF"),
+        "file": declare.text(declare.REQUIRED, "PNG, JPEG or TIFF"),
         **PictureScene.declared(),
         **_with_defaults(temperature, condition),
         "hazards": hazard_tables({}),
@@ -152,13 +144,13 @@ def _picture_keys(condition: SkyCondition) -> Keys:
 def sky_keys(condition: SkyCondition, uncertain: Mapping[str, float]) -> dict[str, Any]:
     """Declared keys of each kind as JSON; arguments as of `load_scene`."""
     sky = _sky_keys(condition, uncertain)
-    return {"sky": described(sky), "picture": described(_picture_keys(condition))}
+    return {"sky": declare.described(sky), "picture": declare.described(_picture_keys(condition))}
 
 
 def _sky(
     given: Mapping[str, Any], condition: SkyCondition, uncertain: Mapping[str, float]
 ) -> SkyView:
-    values = read_table(given, _sky_keys(condition, uncertain, given.get("seed", 0)))
+    values = declare.read_table(given, _sky_keys(condition, uncertain, given.get("seed", 0)))
     first = _pose({key: values.pop(key) for key in _POSE if key in values})
     poses: list[Pose] = []
     for pose in values.pop("poses", ()):
@@ -211,7 +203,7 @@ def _pose(values: dict[str, Any]) -> Pose:
 
 
 def _picture(given: Mapping[str, Any], folder: Path, condition: SkyCondition) -> SkyView:
-    values = read_table(given, _picture_keys(condition))
+    values = declare.read_table(given, _picture_keys(condition))
     _, values["hazards"] = split_hazards(values.pop("hazards", ()))
     condition = replace(condition, **values_for(condition, values))
     values["file"] = folder / values["file"]

@@ -11,19 +11,9 @@ import numpy as np
 from cubestack.emulator.camera.common.optics import Optics
 from cubestack.emulator.camera.common.scene_file import sky_keys
 from cubestack.emulator.camera.common.view import SkyCondition, SkyView, View
+from cubestack.emulator.scene import form
 from cubestack.emulator.scene.atmosphere import Atmosphere
 from cubestack.emulator.scene.attitude import matrix_from_quaternion, pointing_from_matrix
-from cubestack.emulator.scene.form import (
-    CameraField,
-    Matrix,
-    SceneForm,
-    SkyMap,
-    Table,
-    bodies_of,
-    changed_fields,
-    hazard_table,
-    round_values,
-)
 from cubestack.emulator.scene.sky import Pose, Scene, SkyScene
 from cubestack.firmware_model.values import plain
 
@@ -35,37 +25,39 @@ BORDER = 24
 
 def sky_form(
     condition: SkyCondition, uncertain: Mapping[str, float] = MappingProxyType({})
-) -> SceneForm[SkyView]:
+) -> form.SceneForm[SkyView]:
     """Form of a device with this default condition; arguments as of `load_scene`."""
-    return SceneForm(sky_keys(condition, uncertain), _view, partial(_table, condition), _sky_map)
+    return form.SceneForm(
+        sky_keys(condition, uncertain), _view, partial(_table, condition), _sky_map
+    )
 
 
 def _view(board: Any) -> SkyView:
     return View(board.camera.scene, board.camera.condition)
 
 
-def _table(usual: SkyCondition, view: SkyView) -> Table:
+def _table(usual: SkyCondition, view: SkyView) -> form.Table:
     scene, condition = view.scene, view.condition
     table = _sky(scene) if isinstance(scene, SkyScene) else _picture(scene)
     seed = table.get("seed", 0)
-    table |= changed_fields(condition, usual, "optics", "hazards", "seed")
+    table |= form.changed_fields(condition, usual, "optics", "hazards", "seed")
     hazards = (*getattr(scene, "hazards", ()), *condition.hazards)
-    optics = changed_fields(condition.optics, usual.optics, "residuals")
-    return table | ({"optics": optics} if optics else {}) | hazard_table(hazards, seed)
+    optics = form.changed_fields(condition.optics, usual.optics, "residuals")
+    return table | ({"optics": optics} if optics else {}) | form.hazard_table(hazards, seed)
 
 
-def _picture(scene: Scene) -> Table:
+def _picture(scene: Scene) -> form.Table:
     assert not isinstance(scene, SkyScene)
-    table: Table = {"kind": "picture", "file": str(scene.file), "crop": plain(scene.crop)}
+    table: form.Table = {"kind": "picture", "file": str(scene.file), "crop": plain(scene.crop)}
     more = {"exposure_ms": scene.exposure_ms, "quaternion": plain(scene.quaternion)}
     return table | {key: value for key, value in more.items() if value is not None}
 
 
-def _sky(scene: SkyScene) -> Table:
+def _sky(scene: SkyScene) -> form.Table:
     first, *later = scene.all_poses
-    table: Table = {"kind": "sky", **_pose(first)}
+    table: form.Table = {"kind": "sky", **_pose(first)}
     usual = SkyScene(scene.quaternion)
-    table |= changed_fields(
+    table |= form.changed_fields(
         *(scene, usual), "quaternion", "rate_deg_s", "poses", "atmosphere", "hazards"
     )
     if later:
@@ -73,39 +65,39 @@ def _sky(scene: SkyScene) -> Table:
     air = scene.atmosphere
     if air is not None:
         needed = {"latitude_deg": air.latitude_deg, "sidereal_deg": air.sidereal_deg}
-        table["atmosphere"] = needed | changed_fields(
+        table["atmosphere"] = needed | form.changed_fields(
             air, Atmosphere(air.latitude_deg, air.sidereal_deg)
         )
     return table
 
 
-def _pose(pose: Pose) -> Table:
+def _pose(pose: Pose) -> form.Table:
     angles = pointing_from_matrix(matrix_from_quaternion(pose.quaternion))
-    found = dict(zip(("ra_deg", "dec_deg", "roll_deg"), round_values(angles), strict=True))
+    found = dict(zip(("ra_deg", "dec_deg", "roll_deg"), form.round_values(angles), strict=True))
     rate = np.asarray(pose.rate_deg_s, np.float64)
     return found | ({"rate_deg_s": rate.tolist()} if np.any(rate) else {})
 
 
-def _sky_map(view: SkyView, now_ps: int) -> SkyMap:
+def _sky_map(view: SkyView, now_ps: int) -> form.SkyMap:
     scene, border = view.scene, outline(view.condition.lens)
     known = [None if (q := scene.truth(ps)) is None else _camera(q, border) for ps in (0, now_ps)]
     at_first, now = known
     moved = at_first is not None and now is not None and not np.allclose(at_first.axes, now.axes)
-    return SkyMap(
+    return form.SkyMap(
         TITLE,
         () if at_first is None else (at_first,),
         (now,) if moved and now is not None else (),
-        bodies_of(scene.hazards) if isinstance(scene, SkyScene) else (),
+        form.bodies_of(scene.hazards) if isinstance(scene, SkyScene) else (),
         stars=True,
     )
 
 
-def _camera(quaternion: Matrix, border: Matrix) -> CameraField:
+def _camera(quaternion: form.Matrix, border: form.Matrix) -> form.CameraField:
     axes = matrix_from_quaternion(quaternion)
-    return CameraField("camera", axes, border @ axes)
+    return form.CameraField("camera", axes, border @ axes)
 
 
-def outline(lens: Optics) -> Matrix:
+def outline(lens: Optics) -> form.Matrix:
     """Directions (n, 3) in camera axes along the border of what a lens images on its sensor."""
     right, bottom = lens.columns - 0.5, lens.rows - 0.5
     corners = [(-0.5, -0.5), (right, -0.5), (right, bottom), (-0.5, bottom), (-0.5, -0.5)]

@@ -30,13 +30,7 @@ from cubestack.emulator.camera.ov7620.luminance import SPOT_PX
 from cubestack.emulator.scene.attitude import vector_from_angles
 from cubestack.emulator.scene.earth import angular_radius_deg
 from cubestack.emulator.scene.earth_sun import CameraTarget, EarthSunScene
-from cubestack.emulator.scene.hazards.contract import (
-    EARTH_RADIANCE,
-    CameraState,
-    Depth,
-    SkyHazard,
-    Vectors,
-)
+from cubestack.emulator.scene.hazards import contract as sky
 from cubestack.emulator.scene.hazards.ghosts import Ghosts
 from cubestack.emulator.scene.hazards.moon import Moon
 from cubestack.emulator.sim.virtual_time import PS_PER_S
@@ -112,9 +106,9 @@ def scene_light(
     return light
 
 
-def fisheye_state(scene: EarthSunScene, camera: CameraTarget, time_ps: int) -> CameraState:
+def fisheye_state(scene: EarthSunScene, camera: CameraTarget, time_ps: int) -> sky.CameraState:
     """The state of ``camera`` for hazards, with the nominal lens."""
-    return CameraState(
+    return sky.CameraState(
         scene.axes(camera, time_ps),
         2 * FIELD_DEG,
         2 * FIELD_DEG,
@@ -151,21 +145,21 @@ def _slant_transmission(straight: float, radius_px: ArrayLike) -> NDArray[np.flo
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Disc(SkyHazard):
+class _Disc(sky.SkyHazard):
     """The scene's Earth, which hides hazards."""
 
     nadir: tuple[float, ...]
     radius_rad: float
 
     name: ClassVar[str] = "earth"
-    depth: ClassVar[Depth] = Depth.EARTH
+    depth: ClassVar[sky.Depth] = sky.Depth.EARTH
 
-    def hidden(self, state: CameraState, vectors: Vectors) -> NDArray[np.bool_]:
+    def hidden(self, state: sky.CameraState, vectors: sky.Vectors) -> NDArray[np.bool_]:
         del state
         return np.asarray(vectors @ np.array(self.nadir) > math.cos(self.radius_rad))
 
 
-def _hazards(scene: EarthSunScene) -> list[SkyHazard]:
+def _hazards(scene: EarthSunScene) -> list[sky.SkyHazard]:
     """The scene's hazards with its Sun, and its Moon as a hazard."""
     found = list(scene.hazards)
     if scene.moon is not None:
@@ -192,7 +186,7 @@ def _add_hazards(
     state = fisheye_state(scene, camera, time_ps)
     radius = math.radians(angular_radius_deg(scene.altitude_km))
     earth = _Disc(nadir=tuple(np.asarray(scene.nadir).tolist()), radius_rad=radius)
-    level = EARTH_LEVEL / _usual_lines(CameraTarget.NADIR) / EARTH_RADIANCE
+    level = EARTH_LEVEL / _usual_lines(CameraTarget.NADIR) / sky.EARTH_RADIANCE
     vectors = field.vectors.astype(np.float64) @ state.axes
     for hazard in hazards:
         points = hazard.lights(state)

@@ -39,15 +39,7 @@ from cubestack.emulator.scene.ball import BALL, ball_scene
 from cubestack.emulator.scene.earth_sun import EarthSunScene, Mounting, Reflection
 from cubestack.emulator.scene.file import SceneError, read_scene_file, values_for
 from cubestack.emulator.scene.hazards import EARTH_HAZARDS, SKY_HAZARDS
-from cubestack.firmware_model.values import (
-    REQUIRED,
-    Keys,
-    described,
-    read_table,
-    table,
-    vector,
-    whole,
-)
+from cubestack.firmware_model import values as declare
 
 
 def load_earth_sun_scene(path: Path) -> EarthSunView:
@@ -57,14 +49,14 @@ def load_earth_sun_scene(path: Path) -> EarthSunView:
 
 
 def _ball(given: dict[str, Any]) -> EarthSunView:
-    values = read_table(given, _BALL)
+    values = declare.read_table(given, _BALL)
     condition = FisheyeCondition(**values_for(FisheyeCondition, values))
     scene = ball_scene(**{key: values[key] for key in BALL if key in values})
     return EarthSunView(scene, condition)
 
 
 def _view(given: dict[str, Any]) -> EarthSunView:
-    values = read_table(given, _scene_keys(given.get("seed", 0)))
+    values = declare.read_table(given, _scene_keys(given.get("seed", 0)))
     angles = {f"{name}_deg": values.pop(f"{name}_deg", None) for name in ("sun", "nadir")}
     for name in ("sun", "nadir"):
         if name in values and angles[f"{name}_deg"]:
@@ -75,9 +67,9 @@ def _view(given: dict[str, Any]) -> EarthSunView:
     return EarthSunView(EarthSunScene.facing(**angles, **values, hazards=light), condition)
 
 
-_REFLECTION: Keys = {
+_REFLECTION: declare.Keys = {
     **{name: Reflection.declared()[name] for name in ("camera", "radius_px", "level")},
-    "at_deg": vector(2, REQUIRED, "its angles alpha and beta"),
+    "at_deg": declare.vector(2, declare.REQUIRED, "its angles alpha and beta"),
 }
 
 
@@ -90,28 +82,28 @@ def _reflection(values: dict[str, Any]) -> Reflection:
 def _own_lens(camera: str) -> Any:
     keys = {name: one for name, one in LensError.declared().items() if name != "scale"}
     meaning = f"differences of the {camera} camera's lens from the firmware's polynomial"
-    return table(None, meaning, keys, lambda values: LensError(**values))
+    return declare.table(None, meaning, keys, lambda values: LensError(**values))
 
 
-def _scene_keys(seed: int = 0) -> Keys:
+def _scene_keys(seed: int = 0) -> declare.Keys:
     """``seed`` as of `hazard_tables`."""
     return {
         **EarthSunScene.declared(),
-        "nadir_deg": vector(2, None, "its angles in the nadir camera", instead=("nadir",)),
-        "sun_deg": vector(2, None, "its angles in the Sun camera", instead=("sun",)),
-        "nadir_camera": table(None, "its mounting; if omitted, +z", Mounting),
-        "sun_camera": table(None, "its mounting; if omitted, -z", Mounting),
+        "nadir_deg": declare.vector(2, None, "its angles in the nadir camera", instead=("nadir",)),
+        "sun_deg": declare.vector(2, None, "its angles in the Sun camera", instead=("sun",)),
+        "nadir_camera": declare.table(None, "its mounting; if omitted, +z", Mounting),
+        "sun_camera": declare.table(None, "its mounting; if omitted, -z", Mounting),
         "nadir_lens": _own_lens("nadir"),
         "sun_lens": _own_lens("sun"),
-        "reflections": table((), "false lights", _REFLECTION, _reflection, array=True),
+        "reflections": declare.table((), "false lights", _REFLECTION, _reflection, array=True),
         **FisheyeCondition.declared(),
-        "seed": whole(0, "of noise, surface and hot pixels", 0),
+        "seed": declare.whole(0, "of noise, surface and hot pixels", 0),
         "hazards": hazard_tables({**SKY_HAZARDS, **EARTH_HAZARDS}, seed),
     }
 
 
 _SCENE = _scene_keys()
-_BALL: Keys = {
+_BALL: declare.Keys = {
     **BALL,
     **{key: _SCENE[key] for key in ("nadir_lens", "hot_pixels", "hot_pairs", "noise")},
     "seed": _SCENE["seed"],
@@ -120,4 +112,4 @@ _BALL: Keys = {
 
 def earth_sun_keys() -> dict[str, Any]:
     """Declared keys of each kind as JSON."""
-    return {"earth-sun": described(_SCENE), "ball": described(_BALL)}
+    return {"earth-sun": declare.described(_SCENE), "ball": declare.described(_BALL)}

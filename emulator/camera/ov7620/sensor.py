@@ -26,17 +26,10 @@ from cubestack.emulator.camera.common.hazards.contract import Exposure, Lens
 from cubestack.emulator.camera.common.image_sensor import ImageSensor, PixelClock, StreamSegment
 from cubestack.emulator.camera.common.imager import Grey, Light
 from cubestack.emulator.camera.common.shutter import RollingShutter
+from cubestack.emulator.camera.ov7620 import luminance
 from cubestack.emulator.camera.ov7620.fisheye import check_field
 from cubestack.emulator.camera.ov7620.lens_error import NOMINAL, LensError
 from cubestack.emulator.camera.ov7620.light import blur, scene_light
-from cubestack.emulator.camera.ov7620.luminance import (
-    BLACK,
-    ELECTRONS_PER_GREY,
-    PITCH_UM,
-    SPOT_PX,
-    luminance,
-    stuck_pixels,
-)
 from cubestack.emulator.camera.ov7620.sccb import SccbSlave
 from cubestack.emulator.camera.ov7620.view import IN_FOCUS, EarthSunView, FisheyeCondition
 from cubestack.emulator.scene.earth_sun import CameraTarget, EarthSunScene
@@ -257,15 +250,19 @@ class Ov7620(ImageSensor[EarthSunScene, FisheyeCondition]):
             light[:-1] = (light[:-1] + light[1:]) / 2
         # By frame time, so that the noise of a frame does not depend on which ones were rendered.
         seed = [condition.seed, self.camera, shutter.readout_ps]
-        per_count = ELECTRONS_PER_GREY / settings.gain
-        exposure = Exposure(SHAPE, PITCH_UM, shutter.exposure_s, condition.temperature_c, per_count)
-        light = effects.disturb_light(light, hazards, exposure, seed, ELECTRONS_PER_GREY)
-        variance = effects.variance(hazards, exposure) / ELECTRONS_PER_GREY**2
+        per_count = luminance.ELECTRONS_PER_GREY / settings.gain
+        exposure = Exposure(
+            SHAPE, luminance.PITCH_UM, shutter.exposure_s, condition.temperature_c, per_count
+        )
+        light = effects.disturb_light(light, hazards, exposure, seed, luminance.ELECTRONS_PER_GREY)
+        variance = effects.variance(hazards, exposure) / luminance.ELECTRONS_PER_GREY**2
         generator = None
         if condition.noise:
             generator = np.random.Generator(np.random.SFC64(seed))
-        stuck = stuck_pixels(condition.seed, self.camera, condition.hot_count, condition.hot_pairs)
-        grey = luminance(light, settings.gain, generator, stuck, variance)
+        stuck = luminance.stuck_pixels(
+            condition.seed, self.camera, condition.hot_count, condition.hot_pairs
+        )
+        grey = luminance.luminance(light, settings.gain, generator, stuck, variance)
         rows, columns = settings.rows, settings.columns
         window = grey[rows.start : rows.stop, columns.start : columns.stop]
         return np.ascontiguousarray(window[:, ::-1] if settings.mirror else window)
@@ -274,7 +271,7 @@ class Ov7620(ImageSensor[EarthSunScene, FisheyeCondition]):
         if not np.any(self.scene.rate_deg_s):
             time_ps = 0  # the same at all times
         # The light already contains the spot of a lens in focus.
-        further = math.sqrt(max(self._basics.spot_px**2 - SPOT_PX**2, 0))
+        further = math.sqrt(max(self._basics.spot_px**2 - luminance.SPOT_PX**2, 0))
         key = self.scene, self.condition.bloom_px, time_ps, self.lens, further
         if self._light is None or self._light[:-1] != key:
             bloom_px = self.condition.bloom_px
@@ -287,7 +284,7 @@ class Ov7620(ImageSensor[EarthSunScene, FisheyeCondition]):
     def _target_lines(self, time_ps: int) -> float:
         """Line times of exposure at gain 1 that result in the target level."""
         mean = float(self._light_at(time_ps).mean())
-        return (AUTO_LEVEL - BLACK) / max(mean, 1e-6)
+        return (AUTO_LEVEL - luminance.BLACK) / max(mean, 1e-6)
 
 
 def _gain(value: int) -> float:

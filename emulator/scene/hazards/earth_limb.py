@@ -20,20 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.emulator.scene.earth import EARTH_RADIUS_KM, Earth, angular_radius_deg
-from cubestack.emulator.scene.hazards.contract import (
-    EARTH_RADIANCE,
-    SUN_RADIUS_DEG,
-    Body,
-    Brightness,
-    CameraState,
-    Depth,
-    Ring,
-    SkyHazard,
-    Vectors,
-    angles_rad,
-    direction,
-    random_direction_at,
-)
+from cubestack.emulator.scene.hazards import contract as sky
 from cubestack.emulator.scene.hazards.hazard import Strength, heading
 from cubestack.emulator.scene.hazards.sky_glow import S10
 from cubestack.emulator.scene.hazards.sun_glare import OUTER_RAD, aureole
@@ -59,7 +46,7 @@ SUN_AWAY_DEG = 60.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class EarthLimb(SkyHazard):
+class EarthLimb(sky.SkyHazard):
     """The Earth below a satellite, in some direction."""
 
     nadir: tuple[float, ...] = heading(
@@ -80,31 +67,35 @@ class EarthLimb(SkyHazard):
 
     meaning = "the Earth's limb near the boresight or across the picture"
     strength = Strength("boresight to limb", "deg", (45.0, 30.0, 20.0, 15.0, 10.0, 5.0, 0.0), 5.0)
-    depth = Depth.EARTH
+    depth = sky.Depth.EARTH
 
     @classmethod
-    def sample(cls, strength: float, state: CameraState, generator: np.random.Generator) -> Self:
+    def sample(
+        cls, strength: float, state: sky.CameraState, generator: np.random.Generator
+    ) -> Self:
         """The limb at this angle from the boresight, to any side; a Sun that is not in view."""
         radius = angular_radius_deg(600.0)
         nadir = state.random_direction_at(min(radius + strength, 180), generator)
         lowest = math.cos(math.radians(SUN_AWAY_DEG))
         sun_deg = math.degrees(math.acos(generator.uniform(-1, lowest)))
-        sun = random_direction_at(state.boresight, sun_deg, generator)
+        sun = sky.random_direction_at(state.boresight, sun_deg, generator)
         seed = int(generator.integers(2**31))
         return cls(nadir=tuple(nadir.tolist()), sun=tuple(sun.tolist()), seed=seed)
 
     @property
-    def bodies(self) -> tuple[Body, ...]:
+    def bodies(self) -> tuple[sky.Body, ...]:
         radius_deg = angular_radius_deg(self.altitude_km)
-        return Body("Earth", self._nadir, radius_deg), Body("Sun", self._sun, SUN_RADIUS_DEG)
+        return sky.Body("Earth", self._nadir, radius_deg), sky.Body(
+            "Sun", self._sun, sky.SUN_RADIUS_DEG
+        )
 
     @property
-    def _nadir(self) -> Vectors:
-        return direction("nadir", self.nadir)
+    def _nadir(self) -> sky.Vectors:
+        return sky.direction("nadir", self.nadir)
 
     @property
-    def _sun(self) -> Vectors:
-        return -self._nadir if self.sun is None else direction("sun", self.sun)
+    def _sun(self) -> sky.Vectors:
+        return -self._nadir if self.sun is None else sky.direction("sun", self.sun)
 
     @property
     def _radius_rad(self) -> float:
@@ -114,7 +105,7 @@ class EarthLimb(SkyHazard):
     def _distance_km(self) -> float:
         return EARTH_RADIUS_KM + self.altitude_km
 
-    def glow(self, state: CameraState, vectors: Vectors) -> Brightness:
+    def glow(self, state: sky.CameraState, vectors: sky.Vectors) -> sky.Brightness:
         total = np.zeros(len(vectors), np.float32)
         earth = Earth(
             self.altitude_km, self.unevenness, self.glow_km, self.seed, glow_heights=GLOW_HEIGHTS
@@ -123,8 +114,8 @@ class EarthLimb(SkyHazard):
         sight = vectors.astype(np.float32)
         met, light = earth.radiance(sight, pixels, self._nadir, self._sun, np.eye(3))
         light *= self._night(vectors[met])
-        total[met] = light * np.float32(EARTH_RADIANCE)
-        angles = angles_rad(vectors, self._nadir)
+        total[met] = light * np.float32(sky.EARTH_RADIANCE)
+        angles = sky.angles_rad(vectors, self._nadir)
         if self.airglow:
             nearest_km = self._distance_km * np.sin(angles) - EARTH_RADIUS_KM
             nearest_km[angles > math.pi / 2] = np.inf
@@ -134,7 +125,7 @@ class EarthLimb(SkyHazard):
             total += self._scattered(vectors, angles)
         return total
 
-    def _night(self, vectors: Vectors) -> Brightness:
+    def _night(self, vectors: sky.Vectors) -> sky.Brightness:
         """Factor (n,) of dusk on the ground's light along ``vectors``: 1 by day."""
         far = self._distance_km / EARTH_RADIUS_KM
         ahead = far * (vectors @ self._nadir)
@@ -143,7 +134,7 @@ class EarthLimb(SkyHazard):
         sine = (normals @ self._sun) / np.linalg.norm(normals, axis=1)
         return np.asarray(np.exp(np.minimum(sine, 0) / DUSK), np.float32)
 
-    def _scattered(self, vectors: Vectors, angles: NDArray[np.float64]) -> Brightness:
+    def _scattered(self, vectors: sky.Vectors, angles: NDArray[np.float64]) -> sky.Brightness:
         """Light of the lit disc that the lens scatters (n,), at ``angles`` from nadir."""
         heights, turns, light = _scattered_light(self)
         right, down, _ = self._axes
@@ -158,7 +149,7 @@ class EarthLimb(SkyHazard):
         return np.asarray(upper * (1 - row) + lower * row, np.float32)
 
     @property
-    def _axes(self) -> Vectors:
+    def _axes(self) -> sky.Vectors:
         """Axes (3, 3): the third is nadir, the Sun is on the side of the first."""
         across = self._sun - (self._sun @ self._nadir) * self._nadir
         if np.linalg.norm(across) < 1e-9:
@@ -166,7 +157,7 @@ class EarthLimb(SkyHazard):
         across /= np.linalg.norm(across)
         return np.stack([across, np.cross(self._nadir, across), self._nadir])
 
-    def ground(self, vectors: Vectors) -> NDArray[np.float64]:
+    def ground(self, vectors: sky.Vectors) -> NDArray[np.float64]:
         """Mean surface brightness (n,) of the ground along ``vectors`` (n, 3) that meet it."""
         even = Earth(self.altitude_km, 0.0, 0.0, 0)
         small = np.full(len(vectors), 1e-6, np.float32)
@@ -175,17 +166,17 @@ class EarthLimb(SkyHazard):
             vectors.astype(np.float32), small, self._nadir, self._sun, np.eye(3)
         )
         light[met] = shares * self._night(vectors[met])
-        return EARTH_RADIANCE * light
+        return sky.EARTH_RADIANCE * light
 
-    def rings(self, state: CameraState) -> tuple[Ring, ...]:
+    def rings(self, state: sky.CameraState) -> tuple[sky.Ring, ...]:
         top_km = EARTH_RADIUS_KM + max(TOP_KM, GLOW_HEIGHTS * self.glow_km)
         top = math.asin(min(top_km / self._distance_km, 1))
         inner = self._radius_rad - 2 * state.pixel_rad
-        return (Ring(self._nadir, inner, max(top, self._radius_rad + 2 * state.pixel_rad)),)
+        return (sky.Ring(self._nadir, inner, max(top, self._radius_rad + 2 * state.pixel_rad)),)
 
-    def hidden(self, state: CameraState, vectors: Vectors) -> NDArray[np.bool_]:
+    def hidden(self, state: sky.CameraState, vectors: sky.Vectors) -> NDArray[np.bool_]:
         del state
-        return angles_rad(vectors, self._nadir) < self._radius_rad
+        return sky.angles_rad(vectors, self._nadir) < self._radius_rad
 
 
 def airglow_s10(nearest_km: NDArray[np.float64], surface: NDArray[np.bool_]) -> NDArray[np.float32]:
@@ -241,7 +232,7 @@ def _scattered_light(
     return heights, turns, scattered.reshape(len(heights), len(turns))
 
 
-def _directions(heights: NDArray[np.float64], turns: NDArray[np.float64]) -> Vectors:
+def _directions(heights: NDArray[np.float64], turns: NDArray[np.float64]) -> sky.Vectors:
     """Unit vectors (n, 3) at angles ``heights`` (n,) from the third axis, ``turns`` around it."""
     sine = np.sin(heights)
     return np.stack([sine * np.cos(turns), sine * np.sin(turns), np.cos(heights)], axis=1)

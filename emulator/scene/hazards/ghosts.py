@@ -12,19 +12,7 @@ from typing import Self
 import numpy as np
 
 from cubestack.emulator.scene.attitude import angles_from_vector, vector_from_angles
-from cubestack.emulator.scene.hazards.contract import (
-    SUN_RADIUS_DEG,
-    SUN_V,
-    Body,
-    Brightness,
-    CameraState,
-    Depth,
-    Ring,
-    SkyHazard,
-    Vectors,
-    angles_rad,
-    direction,
-)
+from cubestack.emulator.scene.hazards import contract as sky
 from cubestack.emulator.scene.hazards.hazard import Strength, heading
 from cubestack.emulator.scene.hazards.sun_glare import SHARE, aureole
 from cubestack.firmware_model.values import number, whole
@@ -39,7 +27,7 @@ REACH_SIGMAS = 4.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Ghosts(SkyHazard):
+class Ghosts(sky.SkyHazard):
     """Images that the lens makes of the Sun beside the sharp one."""
 
     sun: tuple[float, ...] | None = heading(
@@ -53,44 +41,48 @@ class Ghosts(SkyHazard):
     strength = Strength(
         "share", "of the Sun's light", (1e-7, 1e-6, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3), 1e-4
     )
-    depth = Depth.LENS
+    depth = sky.Depth.LENS
 
     @classmethod
-    def sample(cls, strength: float, state: CameraState, generator: np.random.Generator) -> Self:
+    def sample(
+        cls, strength: float, state: sky.CameraState, generator: np.random.Generator
+    ) -> Self:
         """Of a Sun anywhere in the picture; the brightest ghost has this share of its light."""
         sun = tuple(state.random_direction(generator).tolist())
         return cls(share=strength, sun=sun, seed=int(generator.integers(2**31)))
 
     @property
-    def bodies(self) -> tuple[Body, ...]:
+    def bodies(self) -> tuple[sky.Body, ...]:
         if self.sun is None:
             return ()
-        return (Body("Sun", direction("sun", self.sun), SUN_RADIUS_DEG),)
+        return (sky.Body("Sun", sky.direction("sun", self.sun), sky.SUN_RADIUS_DEG),)
 
-    def glow(self, state: CameraState, vectors: Vectors) -> Brightness:
+    def glow(self, state: sky.CameraState, vectors: sky.Vectors) -> sky.Brightness:
         total = np.zeros(len(vectors), np.float32)
         if self.sun is None:
             return total
-        sun = direction("sun", self.sun)
-        if np.degrees(angles_rad(sun[None], state.boresight)[0]) > state.half_field_deg:
+        sun = sky.direction("sun", self.sun)
+        if np.degrees(sky.angles_rad(sun[None], state.boresight)[0]) > state.half_field_deg:
             return total
-        light = 10 ** (-0.4 * SUN_V)
+        light = 10 ** (-0.4 * sky.SUN_V)
         if self.scatter:
-            total += (light * aureole(angles_rad(vectors, sun), self.scatter)).astype(np.float32)
+            total += (light * aureole(sky.angles_rad(vectors, sun), self.scatter)).astype(
+                np.float32
+            )
         for count, (centre, sigma) in enumerate(self._places(state, sun)):
-            angles = angles_rad(vectors, centre)
+            angles = sky.angles_rad(vectors, centre)
             near = np.flatnonzero(angles < REACH_SIGMAS * sigma)
             peak = light * self.share / 2**count / (2 * np.pi * sigma**2)
             total[near] += peak * np.exp(-0.5 * (angles[near] / sigma) ** 2)
         return total
 
-    def rings(self, state: CameraState) -> tuple[Ring, ...]:
+    def rings(self, state: sky.CameraState) -> tuple[sky.Ring, ...]:
         if self.sun is None:
             return ()
-        places = self._places(state, direction("sun", self.sun))
-        return tuple(Ring(centre, 0.0, REACH_SIGMAS * sigma) for centre, sigma in places)
+        places = self._places(state, sky.direction("sun", self.sun))
+        return tuple(sky.Ring(centre, 0.0, REACH_SIGMAS * sigma) for centre, sigma in places)
 
-    def _places(self, state: CameraState, sun: Vectors) -> list[tuple[Vectors, float]]:
+    def _places(self, state: sky.CameraState, sun: sky.Vectors) -> list[tuple[sky.Vectors, float]]:
         """Centre (3,) and standard deviation in radians of each ghost."""
         generator = np.random.default_rng([self.seed, 0x6057])
         angles = np.array(angles_from_vector(state.axes @ sun))

@@ -11,20 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from cubestack.emulator.scene.attitude import vector_from_angles
-from cubestack.emulator.scene.hazards.contract import (
-    SUN_V,
-    Brightness,
-    CameraState,
-    Depth,
-    Ring,
-    SkyHazard,
-    Vectors,
-)
+from cubestack.emulator.scene.hazards import contract as sky
 from cubestack.emulator.scene.hazards.hazard import Strength
 from cubestack.firmware_model.values import number, whole
 
 SUN_RADIUS_RAD = math.radians(0.2666)
-SUN_SURFACE = 10 ** (-0.4 * SUN_V) / (math.pi * SUN_RADIUS_RAD**2)
+SUN_SURFACE = 10 ** (-0.4 * sky.SUN_V) / (math.pi * SUN_RADIUS_RAD**2)
 """Brightness of the Sun's disc, V = 0 stars per steradian."""
 
 PLACES = (0.7, 0.98)
@@ -33,7 +25,7 @@ LENGTHS, WIDTHS = (0.01, 0.15), (0.004, 0.02)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Glint(SkyHazard):
+class Glint(sky.SkyHazard):
     """Bright patches at a fixed place in the picture."""
 
     surface: float = number(1e-4, "brightness relative to the Sun's surface", 0, 1)
@@ -43,9 +35,9 @@ class Glint(SkyHazard):
     strength = Strength(
         "surface", "of the Sun's surface", (1e-7, 1e-6, 1e-5, 1e-4, 1e-2, 0.1, 1.0), 1e-4
     )
-    depth = Depth.LENS
+    depth = sky.Depth.LENS
 
-    def glow(self, state: CameraState, vectors: Vectors) -> Brightness:
+    def glow(self, state: sky.CameraState, vectors: sky.Vectors) -> sky.Brightness:
         """The patches, each with an edge one pixel wide."""
         total = np.zeros(len(vectors), np.float32)
         for centre, along, across, length, width in self._patches(state):
@@ -57,11 +49,15 @@ class Glint(SkyHazard):
             total[near] = np.maximum(total[near], self.surface * SUN_SURFACE * share)
         return total
 
-    def rings(self, state: CameraState) -> tuple[Ring, ...]:
+    def rings(self, state: sky.CameraState) -> tuple[sky.Ring, ...]:
         patches = self._patches(state)
-        return tuple(Ring(centre, 0.0, length + width) for centre, _, _, length, width in patches)
+        return tuple(
+            sky.Ring(centre, 0.0, length + width) for centre, _, _, length, width in patches
+        )
 
-    def _patches(self, state: CameraState) -> list[tuple[Vectors, Vectors, Vectors, float, float]]:
+    def _patches(
+        self, state: sky.CameraState
+    ) -> list[tuple[sky.Vectors, sky.Vectors, sky.Vectors, float, float]]:
         """Centre, two sides (3,) each, half length and half width in rad of each patch."""
         generator = np.random.default_rng([self.seed, 0x611E7])
         patches = []

@@ -12,20 +12,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from cubestack.emulator.scene.file import SceneError
-from cubestack.firmware_model.values import (
-    REQUIRED,
-    TABLE,
-    WHOLE,
-    Declaration,
-    DeclaredValues,
-    ValueKind,
-    described,
-    many,
-    number,
-    read_table,
-    table,
-    whole,
-)
+from cubestack.firmware_model import values as declare
 
 
 @dataclass(frozen=True)
@@ -45,11 +32,11 @@ class Strength:
 
 def heading(default: Any, meaning: str) -> Any:
     """A direction: three numbers, or right ascension and declination in degrees."""
-    return many(default, meaning, number(REQUIRED, ""), role="direction")
+    return declare.many(default, meaning, declare.number(declare.REQUIRED, ""), role="direction")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Hazard(DeclaredValues):
+class Hazard(declare.DeclaredValues):
     """Something that makes pictures hard to use; SceneError for a value out of its range."""
 
     #: of its table in scene files and on the command line; by default from the class's name
@@ -58,7 +45,7 @@ class Hazard(DeclaredValues):
     strength: ClassVar[Strength]  #: the scale on which experiments vary it
 
     error = SceneError
-    seed: int = whole(0, "of everything random in it", 0, 2**63 - 1)
+    seed: int = declare.whole(0, "of everything random in it", 0, 2**63 - 1)
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
@@ -76,18 +63,18 @@ class Hazard(DeclaredValues):
         ``state`` is the camera, for hazards that have a place in the sky.
         """
         del state
-        counted = cls.declared()[cls.strength.key].kind is WHOLE
+        counted = cls.declared()[cls.strength.key].kind is declare.WHOLE
         values: dict[str, Any] = {cls.strength.key: int(strength) if counted else strength}
         return cls(seed=int(generator.integers(2**31)), **values)
 
 
 @dataclass(frozen=True, kw_only=True)
-class HazardTables(Declaration):
+class HazardTables(declare.Declaration):
     """The key ``hazards``: tables as ``[hazards.moon]``, or ``[[hazards.debris]]`` for several."""
 
     meaning: str = "what makes the picture hard to use"
     default: Any = None
-    kind: ValueKind = TABLE
+    kind: declare.ValueKind = declare.TABLE
     kinds: Mapping[str, type[Hazard]]  #: of hazards, by name
     seed: int = 0  #: of a hazard whose table has none
 
@@ -95,7 +82,7 @@ class HazardTables(Declaration):
         if not isinstance(given, dict):
             raise self.error(given)
         keys = {name: self._tables(kind, given.get(name)) for name, kind in self.kinds.items()}
-        return tuple(one for some in read_table(given, keys).values() for one in some)
+        return tuple(one for some in declare.read_table(given, keys).values() for one in some)
 
     def _tables(self, kind: type[Hazard], given: Any) -> Any:
         several = isinstance(given, list)
@@ -104,11 +91,11 @@ class HazardTables(Declaration):
             made = kind(**{"seed": self.seed, **values})
             return made if several else (made,)
 
-        return table(None, "", kind, make, array=several)
+        return declare.table(None, "", kind, make, array=several)
 
     def described(self) -> dict[str, Any]:
         kinds = {
-            name: {"meaning": kind.meaning, "keys": described(kind.declared())}
+            name: {"meaning": kind.meaning, "keys": declare.described(kind.declared())}
             for name, kind in self.kinds.items()
         }
         return {**super().described(), "type": "kinds", "kinds": kinds}

@@ -13,19 +13,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.emulator.scene.hazards.contract import (
-    SUN_RADIUS_DEG,
-    Body,
-    Brightness,
-    CameraState,
-    Depth,
-    Ring,
-    SkyHazard,
-    Vectors,
-    angles_rad,
-    direction,
-    random_direction_at,
-)
+from cubestack.emulator.scene.hazards import contract as sky
 from cubestack.emulator.scene.hazards.hazard import Strength, heading
 from cubestack.emulator.scene.hazards.sun_glare import SHARE, aureole
 from cubestack.firmware_model.values import number
@@ -41,7 +29,7 @@ LEAST_LIT = 1e-9  # of the phase integral, which is 0 for a new Moon
 
 
 @dataclass(frozen=True, kw_only=True)
-class Moon(SkyHazard):
+class Moon(sky.SkyHazard):
     """The Moon at a fixed direction, its phase given by the Sun's."""
 
     direction: tuple[float, ...] = heading(
@@ -54,48 +42,52 @@ class Moon(SkyHazard):
 
     meaning = "the Moon in the field"
     strength = Strength("lit", "", (0.01, 0.05, 0.2, 0.5, 0.8, 1.0))
-    depth = Depth.MOON
+    depth = sky.Depth.MOON
 
     @classmethod
-    def sample(cls, strength: float, state: CameraState, generator: np.random.Generator) -> Self:
+    def sample(
+        cls, strength: float, state: sky.CameraState, generator: np.random.Generator
+    ) -> Self:
         """Anywhere in the picture; ``strength`` is the share of its disc that is lit, 0 to 1."""
         centre = state.random_direction(generator)
         phase_deg = math.degrees(math.acos(min(max(2 * strength - 1, -1), 1)))
-        sun = random_direction_at(centre, 180 - phase_deg, generator)
+        sun = sky.random_direction_at(centre, 180 - phase_deg, generator)
         return cls(direction=tuple(centre.tolist()), sun=tuple(sun.tolist()))
 
     @property
-    def _centre(self) -> Vectors:
-        return direction("direction", self.direction)
+    def _centre(self) -> sky.Vectors:
+        return sky.direction("direction", self.direction)
 
     @property
-    def _sun(self) -> Vectors:
-        return -self._centre if self.sun is None else direction("sun", self.sun)
+    def _sun(self) -> sky.Vectors:
+        return -self._centre if self.sun is None else sky.direction("sun", self.sun)
 
     @property
-    def bodies(self) -> tuple[Body, ...]:
-        moon = Body("Moon", self._centre, math.degrees(RADIUS_RAD))
-        return (moon,) if self.sun is None else (moon, Body("Sun", self._sun, SUN_RADIUS_DEG))
+    def bodies(self) -> tuple[sky.Body, ...]:
+        moon = sky.Body("Moon", self._centre, math.degrees(RADIUS_RAD))
+        return (
+            (moon,) if self.sun is None else (moon, sky.Body("Sun", self._sun, sky.SUN_RADIUS_DEG))
+        )
 
     @property
     def phase_deg(self) -> float:
         """Angle at the Moon between Sun and observer; 0 when full."""
-        return 180 - math.degrees(float(angles_rad(self._sun[None], self._centre)[0]))
+        return 180 - math.degrees(float(sky.angles_rad(self._sun[None], self._centre)[0]))
 
     @property
     def v_mag(self) -> float:
         """Magnitude of the whole Moon, -12.73 when full."""
         return -12.73 + 0.026 * self.phase_deg + 4e-9 * self.phase_deg**4
 
-    def glow(self, state: CameraState, vectors: Vectors) -> Brightness:
-        angles = angles_rad(vectors, self._centre)
+    def glow(self, state: sky.CameraState, vectors: sky.Vectors) -> sky.Brightness:
+        angles = sky.angles_rad(vectors, self._centre)
         light = 10 ** (-0.4 * self.v_mag)
         glow = light * aureole(angles, self.scatter)
         on = np.flatnonzero(angles < RADIUS_RAD + state.pixel_rad)
         glow[on] += light * self._disc(vectors[on], state.pixel_rad)
         return glow.astype(np.float32)
 
-    def _disc(self, vectors: Vectors, pixel_rad: float) -> NDArray[np.float64]:
+    def _disc(self, vectors: sky.Vectors, pixel_rad: float) -> NDArray[np.float64]:
         """Brightness (n,) per steradian of a disc whose total light is 1; means over pixels."""
         half_phase = math.radians(self.phase_deg) / 2
         lit = 1.0
@@ -119,11 +111,11 @@ class Moon(SkyHazard):
         even = 1 / (math.pi * RADIUS_RAD**2 * max(lit, LEAST_LIT))
         return np.asarray(even * shine.mean(axis=(1, 2)))
 
-    def rings(self, state: CameraState) -> tuple[Ring, ...]:
+    def rings(self, state: sky.CameraState) -> tuple[sky.Ring, ...]:
         del state
-        return (Ring(self._centre, 0.0, STEEP_RAD),)
+        return (sky.Ring(self._centre, 0.0, STEEP_RAD),)
 
-    def hidden(self, state: CameraState, vectors: Vectors) -> NDArray[np.bool_]:
+    def hidden(self, state: sky.CameraState, vectors: sky.Vectors) -> NDArray[np.bool_]:
         """What is behind the disc, lit or dark."""
         del state
-        return angles_rad(vectors, self._centre) < RADIUS_RAD
+        return sky.angles_rad(vectors, self._centre) < RADIUS_RAD

@@ -10,16 +10,8 @@ from typing import Self
 
 import numpy as np
 
+from cubestack.emulator.scene.hazards import contract as sky
 from cubestack.emulator.scene.hazards import ephemeris
-from cubestack.emulator.scene.hazards.contract import (
-    Body,
-    CameraState,
-    Depth,
-    Lights,
-    SkyHazard,
-    Vectors,
-    direction,
-)
 from cubestack.emulator.scene.hazards.hazard import Strength, heading
 from cubestack.firmware_model.values import number
 
@@ -34,12 +26,12 @@ MAGNITUDES = {
     "neptune": (-6.87,),
 }
 
-SATURN_POLE = direction("pole", (40.589, 83.537))
+SATURN_POLE = sky.direction("pole", (40.589, 83.537))
 """Unit vector along the ring's axis, from its right ascension and declination (IAU)."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Planets(SkyHazard):
+class Planets(sky.SkyHazard):
     """All planets at a date, or a single bright light."""
 
     julian_date: float = number(
@@ -52,23 +44,27 @@ class Planets(SkyHazard):
 
     meaning = "planets among the stars"
     strength = Strength("v_mag", "mag", (6.0, 4.0, 2.0, 0.0, -2.5, -4.5), -2.5)
-    depth = Depth.PLANETS
+    depth = sky.Depth.PLANETS
 
     @classmethod
-    def sample(cls, strength: float, state: CameraState, generator: np.random.Generator) -> Self:
+    def sample(
+        cls, strength: float, state: sky.CameraState, generator: np.random.Generator
+    ) -> Self:
         """One planet of this magnitude anywhere in the picture."""
         return cls(direction=tuple(state.random_direction(generator).tolist()), v_mag=strength)
 
     @property
-    def bodies(self) -> tuple[Body, ...]:
+    def bodies(self) -> tuple[sky.Body, ...]:
         if self.direction is not None:
-            return (Body("planet", direction("direction", self.direction)),)
+            return (sky.Body("planet", sky.direction("direction", self.direction)),)
         there = {one: ephemeris.geocentric(one, self.julian_date) for one in MAGNITUDES}
-        return tuple(Body(one.title(), at / np.linalg.norm(at)) for one, at in there.items())
+        return tuple(sky.Body(one.title(), at / np.linalg.norm(at)) for one, at in there.items())
 
-    def lights(self, state: CameraState) -> Lights:
+    def lights(self, state: sky.CameraState) -> sky.Lights:
         if self.direction is not None:
-            return Lights(direction("direction", self.direction)[None], np.array([self.v_mag]))
+            return sky.Lights(
+                sky.direction("direction", self.direction)[None], np.array([self.v_mag])
+            )
         date = self.julian_date + state.time_s / ephemeris.DAY_S
         there = np.array([ephemeris.geocentric(planet, date) for planet in MAGNITUDES])
         earth = ephemeris.heliocentric("earth", date)
@@ -76,10 +72,10 @@ class Planets(SkyHazard):
             magnitude(planet, vector + earth, vector)
             for planet, vector in zip(MAGNITUDES, there, strict=True)
         ]
-        return Lights(there / np.linalg.norm(there, axis=1, keepdims=True), np.array(v_mag))
+        return sky.Lights(there / np.linalg.norm(there, axis=1, keepdims=True), np.array(v_mag))
 
 
-def magnitude(planet: str, from_sun: Vectors, from_earth: Vectors) -> float:
+def magnitude(planet: str, from_sun: sky.Vectors, from_earth: sky.Vectors) -> float:
     """V magnitude of a planet at ``from_sun`` and ``from_earth`` (3,), au."""
     r, distance = float(np.linalg.norm(from_sun)), float(np.linalg.norm(from_earth))
     cosine = float(from_sun @ from_earth) / (r * distance)

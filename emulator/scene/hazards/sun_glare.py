@@ -21,18 +21,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.emulator.scene.hazards.contract import (
-    SUN_RADIUS_DEG,
-    SUN_V,
-    Body,
-    Brightness,
-    CameraState,
-    Depth,
-    SkyHazard,
-    Vectors,
-    angles_rad,
-    direction,
-)
+from cubestack.emulator.scene.hazards import contract as sky
 from cubestack.emulator.scene.hazards.hazard import Strength, heading
 from cubestack.firmware_model.values import number
 
@@ -56,14 +45,14 @@ MOST = 1.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class SunGlare(SkyHazard):
+class SunGlare(sky.SkyHazard):
     """A bright source beside the field."""
 
     direction: tuple[float, ...] = heading(
         (0.0, 0.0, 1.0), "of the source: three numbers, or right ascension and declination in deg"
     )
     v_mag: float = number(
-        SUN_V, "its magnitude: Sun -26.74, lit Earth about -25, full Moon -12.73", -30, 30
+        sky.SUN_V, "its magnitude: Sun -26.74, lit Earth about -25, full Moon -12.73", -30, 30
     )
     transmittance: float = number(
         1e-7, "brightness per steradian at 45 deg, relative to its light", 0, 1
@@ -73,22 +62,24 @@ class SunGlare(SkyHazard):
 
     meaning = "stray light of the Sun beside the field"
     strength = Strength("angle", "deg", (90.0, 70.0, 60.0, 50.0, 45.0, 40.0, 35.0), 45.0)
-    depth = Depth.LENS
+    depth = sky.Depth.LENS
 
     @classmethod
-    def sample(cls, strength: float, state: CameraState, generator: np.random.Generator) -> Self:
+    def sample(
+        cls, strength: float, state: sky.CameraState, generator: np.random.Generator
+    ) -> Self:
         """The Sun at this angle from the boresight, to any side."""
         return cls(direction=tuple(state.random_direction_at(strength, generator).tolist()))
 
     @property
-    def bodies(self) -> tuple[Body, ...]:
-        name = "Sun" if self.v_mag == SUN_V else "stray light"
-        return (Body(name, direction("direction", self.direction), SUN_RADIUS_DEG),)
+    def bodies(self) -> tuple[sky.Body, ...]:
+        name = "Sun" if self.v_mag == sky.SUN_V else "stray light"
+        return (sky.Body(name, sky.direction("direction", self.direction), sky.SUN_RADIUS_DEG),)
 
-    def glow(self, state: CameraState, vectors: Vectors) -> Brightness:
-        source = direction("direction", self.direction)
-        aside_rad = float(angles_rad(state.boresight[None], source)[0])
+    def glow(self, state: sky.CameraState, vectors: sky.Vectors) -> sky.Brightness:
+        source = sky.direction("direction", self.direction)
+        aside_rad = float(sky.angles_rad(state.boresight[None], source)[0])
         decades = (math.degrees(aside_rad) - REFERENCE_DEG) / self.decade_deg
         level = min(self.transmittance * 10**-decades, MOST) * 10 ** (-0.4 * self.v_mag)
-        nearer_deg = np.degrees(aside_rad - angles_rad(vectors, source))
+        nearer_deg = np.degrees(aside_rad - sky.angles_rad(vectors, source))
         return np.asarray(level * np.exp(nearer_deg / self.slope_deg), np.float32)
