@@ -187,37 +187,12 @@ int64_t iss_take(IssMachine *machine, efm32gg::Outgoing *out, int64_t count) {
     return taken;
 }
 
-// Registers by number: r0..r15, then xpsr, msp, psp, primask, basepri, faultmask, control.
 uint32_t iss_register(const IssMachine *machine, int32_t number) {
-    const Cpu &cpu = machine->cpu;
-    switch (number) {
-    case 16: return cpu.xpsr();
-    case 17: return cpu.main_sp();
-    case 18: return cpu.process_sp();
-    case 19: return cpu.primask;
-    case 20: return cpu.basepri;
-    case 21: return cpu.faultmask;
-    case 22: return cpu.control;
-    default: return number >= 0 && number < 16 ? cpu.r[number] : 0;
-    }
+    return machine->cpu.debug_register(number);
 }
 
 void iss_set_register(IssMachine *machine, int32_t number, uint32_t value) {
-    Cpu &cpu = machine->cpu;
-    switch (number) {
-    case 13: cpu.r[13] = value & ~3u; break;
-    case 15: cpu.r[15] = value & ~1u; break;
-    case 16: cpu.set_xpsr(value); break;
-    case 17: cpu.set_main_sp(value); break;
-    case 18: cpu.set_process_sp(value); break;
-    case 19: cpu.primask = value & 1, machine->system.priority_changed(); break;
-    case 20: cpu.basepri = (uint8_t)value, machine->system.priority_changed(); break;
-    case 21: cpu.faultmask = value & 1, machine->system.priority_changed(); break;
-    case 22: cpu.set_control(value & 3); break;
-    default:
-        if (number >= 0 && number < 16)
-            cpu.r[number] = value;
-    }
+    machine->cpu.set_debug_register(number, value);
 }
 
 // As a debugger: without side effects. Returns the number of bytes read.

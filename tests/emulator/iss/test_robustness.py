@@ -105,16 +105,6 @@ def test_empty_vector_table_locks_up_and_the_part_resets(machine):
     assert OutgoingKind.RESET in outcome(machine, b"")
 
 
-def test_jump_to_an_unused_address_is_a_hard_fault(machine):
-    outcome(machine, program("ldr r0, =0x30000001; bx r0"))
-    assert machine.register("xpsr") & 0x1FF == 3
-
-
-def test_stack_overflow_is_a_hard_fault(machine):
-    outcome(machine, program("push: .short 0xB5FF; b push", stack=RAM_BASE + 64))
-    assert machine.register("xpsr") & 0x1FF == 3
-
-
 def test_endless_loop_with_interrupts_off_ends_at_its_time(machine):
     begin = start(machine, program("cpsid i"))
     assert machine.run(begin + MS).reason == StopReason.TIME

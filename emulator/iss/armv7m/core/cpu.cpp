@@ -143,4 +143,34 @@ void Cpu::change_masks(uint32_t value) {
     system->priority_changed();
 }
 
+uint32_t Cpu::debug_register(int number) const {
+    switch (number) {
+    case 16: return xpsr();
+    case 17: return main_sp();
+    case 18: return process_sp();
+    case 19: return primask;
+    case 20: return basepri;
+    case 21: return faultmask;
+    case 22: return control;
+    default: return number >= 0 && number < 16 ? r[number] : 0;
+    }
+}
+
+void Cpu::set_debug_register(int number, uint32_t value) {
+    switch (number) {
+    case 13: r[13] = value & ~3u; break;
+    case 15: r[15] = value & ~1u; break;
+    case 16: set_xpsr(value); break;
+    case 17: set_main_sp(value); break;
+    case 18: set_process_sp(value); break;
+    case 19: primask = value & 1, system->priority_changed(); break;
+    case 20: basepri = (uint8_t)value, system->priority_changed(); break;
+    case 21: faultmask = value & 1, system->priority_changed(); break;
+    case 22: set_control(value & 3); break;
+    default:
+        if (number >= 0 && number < 16)
+            r[number] = value;
+    }
+}
+
 }  // namespace armv7m

@@ -116,6 +116,10 @@ public:
     void set_main_sp(uint32_t value) { (control & 2 ? other_sp : r[13]) = value & ~3u; }
     void set_process_sp(uint32_t value) { (control & 2 ? r[13] : other_sp) = value & ~3u; }
     void set_control(uint8_t value);   // switches r[13] when SPSEL changes
+    // Registers for a debugger by number: r0..r15, then xpsr, msp, psp, primask, basepri,
+    // faultmask, control.
+    uint32_t debug_register(int number) const;
+    void set_debug_register(int number, uint32_t value);
 
     // Sets the registers to their reset values, except those that System reads from the vector
     // table.

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from cubestack.emulator.iss.binding import FOLDER, LOOP
 from cubestack.emulator.iss.insight.fault_report import FaultRecord
+from cubestack.emulator.iss.machine import REGISTERS as CORE
 from cubestack.emulator.native import cache
 from cubestack.emulator.native.compiler import Compiler, compile_library
 
@@ -19,11 +20,11 @@ LINE_HIGH, LINE_LOW, PULSE, NMI = range(4)
 """Kinds of events."""
 
 REGISTERS = {
-    **{f"r{n}": n for n in range(13)},
-    "sp": 13, "lr": 14, "pc": 15, "xpsr": 16, "msp": 17, "psp": 18, "control": 19, "primask": 20,
-    "faultmask": 21, "basepri": 22, "sleep": 23, "locked": 24, "priority": 25, "resets": 26,
-    "exit_code": 27, "debug_stop": 28,
-}  # fmt: skip
+    name: number
+    for number, name in enumerate(
+        (*CORE, "sleep", "locked", "priority", "resets", "exit_code", "debug_stop")
+    )
+}
 
 SYSTEM = {
     **{name: 0xE000_ED04 + 4 * n for n, name in enumerate((
@@ -61,7 +62,7 @@ _FUNCTIONS = {
     "set_cycles": (None, (_P, _L)), "next_cycle": (_L, (_P,)), "service": (None, (_P,)),
     "return": (None, (_P, _U)), "line": (None, (_P, _I, _I)), "debugger": (None, (_P, _I, _U)),
     "read": (_I, (_P, _U, _I, ctypes.POINTER(_U))), "write": (_I, (_P, _U, _I, _U)),
-    "peek": (_U, (_P, _U)), "log": (_I, (_P, _P, _I)), "text": (_I, (_P, _P, _I)),
+    "peek": (_U, (_P, _U)), "log": (_I, (_P, _P, _I)), "text": (ctypes.c_char_p, (_P,)),
     "fault": (None, (_P, _P)),
 }  # fmt: skip
 """Result and argument types of system_bench.cpp."""
@@ -150,9 +151,7 @@ class Bench:
     @property
     def text(self) -> str:
         """Text by semihosting, and by the ITM as ``<port:value/bytes>``."""
-        buffer = ctypes.create_string_buffer(8192)
-        length = self._library.bench_text(self._bench, buffer, 8192)
-        return buffer.raw[:length].decode()
+        return self._library.bench_text(self._bench).decode()
 
     @property
     def fault(self) -> FaultRecord:

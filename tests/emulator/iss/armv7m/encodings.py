@@ -20,23 +20,13 @@ Fields = dict[str, int]
 
 @dataclass(frozen=True)
 class Encoding:
-    """One encoding.
+    """One encoding."""
 
-    Attributes:
-        name: mnemonic and number.
-        template: its bits.
-        valid: returns whether the instruction with these fields is predictable.
-        moves: the most bytes by which write-back changes register ``p``.
-        results: written fields besides ``d``.
-        in_it: allowed in an IT block.
-    """
-
-    name: str
-    template: str
-    valid: Callable[[Fields], bool] | None = None
-    moves: int = 0
-    results: tuple[str, ...] = ()
-    in_it: bool = True
+    name: str  #: mnemonic and number
+    template: str  #: its bits
+    valid: Callable[[Fields], bool] | None = None  #: whether these fields are predictable
+    moves: int = 0  #: the most bytes by which write-back changes register ``p``
+    in_it: bool = True  #: allowed in an IT block
 
 
 def _shift_add_16() -> list[Encoding]:
@@ -131,6 +121,10 @@ def _plain_constants() -> list[Encoding]:
     ]
 
 
+def _two_results(fields: Fields) -> bool:
+    return fields["d"] != fields["e"]
+
+
 def _registers_32() -> list[Encoding]:
     rows = {}
     for number, name in enumerate(["LSL", "LSR", "ASR", "ROR"]):
@@ -147,10 +141,7 @@ def _registers_32() -> list[Encoding]:
     rows["UDIV T1"] = "111110111011 n 1111 d 1111 m"
     found = [Encoding(name, template) for name, template in rows.items()]
     for name, bits in {"SMULL": "1000", "UMULL": "1010", "SMLAL": "1100", "UMLAL": "1110"}.items():
-        found.append(
-            Encoding(f"{name} T1", f"11111011{bits} n e d 0000 m", lambda f: f["d"] != f["e"],
-                     results=("e",))
-        )  # fmt: skip
+        found.append(Encoding(f"{name} T1", f"11111011{bits} n e d 0000 m", _two_results))
     return found
 
 
@@ -205,11 +196,10 @@ def _several_accesses() -> list[Encoding]:
         return fields["p"] not in (fields["m"], fields["n"])
 
     return [
-        Encoding("LDRD (offset)", "1110100 1 U:1 1 0 1 q d e i:8", distinct, results=("e",)),
-        Encoding("LDRD (before)", "1110100 1 U:1 1 1 1 q d e i:8", distinct, 1020, ("e",)),
-        Encoding("LDRD (after)", "1110100 0 U:1 1 1 1 q d e i:8", distinct, 1020, ("e",)),
-        Encoding("LDRD literal", "1110100 1 U:1 1 0 1 1111 d e i:8", lambda f: f["d"] != f["e"],
-                 results=("e",)),
+        Encoding("LDRD (offset)", "1110100 1 U:1 1 0 1 q d e i:8", distinct),
+        Encoding("LDRD (before)", "1110100 1 U:1 1 1 1 q d e i:8", distinct, 1020),
+        Encoding("LDRD (after)", "1110100 0 U:1 1 1 1 q d e i:8", distinct, 1020),
+        Encoding("LDRD literal", "1110100 1 U:1 1 0 1 1111 d e i:8", _two_results),
         Encoding("STRD (offset)", "1110100 1 U:1 1 0 0 q m n i:8"),
         Encoding("STRD (before)", "1110100 1 U:1 1 1 0 q m n i:8", stored, 1020),
         Encoding("STRD (after)", "1110100 0 U:1 1 1 0 q m n i:8", stored, 1020),

@@ -43,19 +43,13 @@ for _name, (_width, _) in _PARSED.items():
 
 @dataclass
 class Slice:
-    """A slice.
+    """A slice."""
 
-    Attributes:
-        start: address of its first instruction.
-        code: its half-words; it ends at ``END``.
-        registers: r0 to r12, SP, LR, process SP, flags (bits 31 to 27) at its start.
-        classes: names of the encodings in it.
-    """
-
-    start: int
-    code: list[int]
+    start: int  #: address of its first instruction
+    code: list[int]  #: its half-words; it ends at ``END``
+    #: r0 to r12, SP, LR, process SP, flags (bits 31 to 27) at its start
     registers: list[int]
-    classes: list[str]
+    classes: list[str]  #: names of the encodings in it
 
 
 @dataclass

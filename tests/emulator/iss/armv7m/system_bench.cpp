@@ -6,7 +6,6 @@
 #include "armv7m/system/system.h"
 
 #include <algorithm>
-#include <cstring>
 #include <string>
 #include <vector>
 
@@ -138,37 +137,19 @@ void bench_at(Bench *bench, int64_t cycle, int32_t kind, int32_t number) {
 }
 
 uint32_t bench_get(Bench *bench, int32_t which) {
-    Cpu &cpu = bench->cpu;
     switch (which) {
-    case 16: return cpu.xpsr();
-    case 17: return cpu.main_sp();
-    case 18: return cpu.process_sp();
-    case 19: return cpu.control;
-    case 20: return cpu.primask;
-    case 21: return cpu.faultmask;
-    case 22: return cpu.basepri;
     case 23: return (uint32_t)bench->system.sleep();
     case 24: return bench->system.locked_up();
     case 25: return (uint32_t)bench->system.execution_priority();
     case 26: return (uint32_t)bench->resets;
     case 27: return (uint32_t)bench->exit_code;
     case 28: return (uint32_t)bench->system.stopped_by();
-    default: return cpu.r[which];
+    default: return bench->cpu.debug_register(which);
     }
 }
 
 void bench_set(Bench *bench, int32_t which, uint32_t value) {
-    Cpu &cpu = bench->cpu;
-    switch (which) {
-    case 16: cpu.set_xpsr(value); break;
-    case 17: cpu.set_main_sp(value); break;
-    case 18: cpu.set_process_sp(value); break;
-    case 19: cpu.set_control((uint8_t)value); break;
-    case 20: cpu.primask = (uint8_t)value; bench->system.priority_changed(); break;
-    case 21: cpu.faultmask = (uint8_t)value; bench->system.priority_changed(); break;
-    case 22: cpu.basepri = (uint8_t)value; bench->system.priority_changed(); break;
-    default: cpu.r[which] = value;
-    }
+    bench->cpu.set_debug_register(which, value);
 }
 
 int64_t bench_cycles(Bench *bench) { return bench->cpu.cycles; }
@@ -197,11 +178,7 @@ int32_t bench_log(Bench *bench, LogEntry *entries, int32_t most) {
     return count;
 }
 
-int32_t bench_text(Bench *bench, char *buffer, int32_t most) {
-    const int32_t length = std::min((int32_t)bench->text.size(), most);
-    std::memcpy(buffer, bench->text.data(), (size_t)length);
-    return length;
-}
+const char *bench_text(Bench *bench) { return bench->text.c_str(); }
 
 void bench_fault(Bench *bench, FaultRecord *record) { *record = bench->system.last_fault(); }
 

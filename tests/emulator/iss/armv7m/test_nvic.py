@@ -176,19 +176,3 @@ def test_registers_of_unimplemented_interrupts_read_zero():
     assert (bench.read(IPR + 36), bench.read(IPR + 40)) == (0x00E0E0E0, 0)
     assert bench.read(IPR + 37, 1) == 0xE0
     assert bench.read(0xE000E004) == 1  # ICTR
-
-
-def test_line_that_stays_high_pends_again_at_the_end_of_its_handler():
-    bench = Bench()
-    bench.write(ISER, 1 << 5)
-    bench.line(5, True)
-    bench.service()
-    assert (bench.ipsr, bench.read(ISPR)) == (21, 0)
-    bench.exception_return(bench["lr"])
-    assert bench.ipsr == 21  # chained
-    bench.line(5, False)
-    bench.exception_return(bench["lr"])
-    assert (bench.ipsr, bench["sp"]) == (0, 0x2000_8000)
-    bench.line(5, True)
-    bench.line(5, False)
-    assert bench.read(ISPR) == 1 << 5  # an edge is kept

@@ -173,8 +173,7 @@ int main(void);
 void IRQ(void);
 void spin(void) { for (;;) ; }
 extern uint32_t data_from, data_start, data_end;
-void start(void)
-{
+void start(void) {
     uint32_t *from = &data_from;
     for (uint32_t *to = &data_start; to < &data_end;)
         *to++ = *from++;

@@ -2,6 +2,7 @@
 
 import pytest
 
+from cubestack.emulator.iss.machine import Machine
 from cubestack.emulator.iss.outcome import OutgoingKind
 
 from .bench import SYSTEM_REQUEST, Bench, S, asleep, mask_of
@@ -213,14 +214,14 @@ SLAVE = 1 | 2
 ADDRESS = 0x34
 
 
-def slave(*names: str, bench: Bench | None = None) -> Bench:
+def slave(*names: str, bench: Bench | None = None) -> tuple[Bench, Machine]:
     bench = routed(SLAVE | control(*names), bench)
-    return bench.load("I2C0", SADDR=ADDRESS, SADDRMASK=0xFE)
+    bench.load("I2C0", SADDR=ADDRESS, SADDRMASK=0xFE)
+    return bench, bench.machine
 
 
 def test_slave_with_autoack_acknowledges_its_address_and_data() -> None:
-    bench = slave("AUTOACK")
-    machine = bench.machine
+    bench, machine = slave("AUTOACK")
     assert machine.i2c_slave_start(0, 0x50) == 0
     machine.i2c_slave_stop(0)
     assert flags(bench, "ADDR", "SSTOP") == flag("SSTOP")
@@ -235,8 +236,7 @@ def test_slave_with_autoack_acknowledges_its_address_and_data() -> None:
 
 
 def test_unread_byte_stretches_the_clock() -> None:
-    bench = slave("AUTOACK")
-    machine = bench.machine
+    bench, machine = slave("AUTOACK")
     assert machine.i2c_slave_start(0, ADDRESS) == 1
     assert machine.i2c_slave_write(0, 0x11) is None  # the address is still in the buffer
     assert machine.i2c_slave_poll(0) is None
@@ -248,8 +248,7 @@ def test_unread_byte_stretches_the_clock() -> None:
 
 
 def test_slave_acknowledges_by_command() -> None:
-    bench = slave()
-    machine = bench.machine
+    bench, machine = slave()
     assert machine.i2c_slave_start(0, ADDRESS) is None
     assert state(bench) == 0x71
     command(bench, "ACK")
@@ -266,8 +265,7 @@ def test_slave_acknowledges_by_command() -> None:
 
 
 def test_slave_read_waits_for_data() -> None:
-    bench = slave("AUTOACK")
-    machine = bench.machine
+    bench, machine = slave("AUTOACK")
     assert machine.i2c_slave_start(0, ADDRESS | 1) == 1
     assert bench["I2C0.RXDATA"] == ADDRESS | 1
     assert machine.i2c_slave_read(0) is None
@@ -282,8 +280,7 @@ def test_slave_read_waits_for_data() -> None:
 
 
 def test_repeated_start_sets_its_flag() -> None:
-    bench = slave("AUTOACK")
-    machine = bench.machine
+    bench, machine = slave("AUTOACK")
     machine.i2c_slave_start(0, ADDRESS)
     bench["I2C0.RXDATA"]
     machine.i2c_slave_write(0, 0x83)
@@ -294,8 +291,7 @@ def test_repeated_start_sets_its_flag() -> None:
 
 
 def test_address_mask_and_general_call() -> None:
-    bench = slave("AUTOACK")
-    machine = bench.machine
+    bench, machine = slave("AUTOACK")
     assert machine.i2c_slave_start(0, 0) == 0
     machine.i2c_slave_stop(0)
     bench.set("I2C0.CTRL.GCAMEN")
@@ -317,15 +313,14 @@ def test_address_mask_and_general_call() -> None:
     ],
 )
 def test_slave_without_pins_clock_or_enable_does_not_answer(name: str, value: int) -> None:
-    bench = slave("AUTOACK")
+    bench, machine = slave("AUTOACK")
     bench[name] = value
-    assert bench.machine.i2c_slave_start(0, ADDRESS) == 0
+    assert machine.i2c_slave_start(0, ADDRESS) == 0
 
 
 def test_address_wakes_a_sleeping_slave_which_stretches_the_clock() -> None:
-    bench = slave("AUTOACK", bench=asleep(2))
+    bench, machine = slave("AUTOACK", bench=asleep(2))
     bench["I2C0.IEN"] = flag("ADDR")
-    machine = bench.machine
     assert machine.i2c_slave_start(0, 0x50) == 0
     machine.i2c_slave_stop(0)
     bench.run_for(10 * 10**6)
@@ -338,10 +333,10 @@ def test_address_wakes_a_sleeping_slave_which_stretches_the_clock() -> None:
 
 
 def test_reset_releases_the_bus() -> None:
-    bench = slave()
-    assert bench.machine.i2c_slave_start(0, ADDRESS) is None
+    bench, machine = slave()
+    assert machine.i2c_slave_start(0, ADDRESS) is None
     bench.reset(SYSTEM_REQUEST)
-    assert bench.machine.i2c_slave_poll(0) == 0
+    assert machine.i2c_slave_poll(0) == 0
     bench = master()
     bench["I2C0.TXDATA"] = 0xA0
     command(bench, "START")
@@ -352,6 +347,6 @@ def test_reset_releases_the_bus() -> None:
 
 
 def test_unit_is_found_by_its_pin() -> None:
-    bench = slave("AUTOACK")
-    assert bench.machine.i2c_slave_start(0x100, ADDRESS) == 0
-    assert bench.machine.i2c_slave_start(0x100 | PD14, ADDRESS) == 1
+    _, machine = slave("AUTOACK")
+    assert machine.i2c_slave_start(0x100, ADDRESS) == 0
+    assert machine.i2c_slave_start(0x100 | PD14, ADDRESS) == 1

@@ -17,18 +17,13 @@ static volatile enum { ADDRESS_WRITE, NUMBER, ADDRESS_READ, DATA, STOPPED, FAILE
 static volatile uint8_t data[4];
 static volatile uint32_t got;
 
-void IRQ(void)
-{
+void IRQ(void) {
     uint32_t pending = I2C0->IF & I2C0->IEN;
-    if (pending & (I2C_IF_ARBLOST | I2C_IF_BUSERR)) {
+    if (pending & (I2C_IF_ARBLOST | I2C_IF_BUSERR | I2C_IF_NACK)) {
         state = FAILED;
         I2C0->IFC = pending;
-        return;
-    }
-    if (pending & I2C_IF_NACK) {
-        I2C0->IFC = I2C_IFC_NACK;
-        state = FAILED;
-        I2C0->CMD = I2C_CMD_STOP;
+        if (pending & I2C_IF_NACK)
+            I2C0->CMD = I2C_CMD_STOP;
         return;
     }
     if (pending & I2C_IF_MSTOP) {
@@ -68,8 +63,7 @@ void IRQ(void)
     }
 }
 
-int main(void)
-{
+int main(void) {
     CMU->HFPERCLKEN0 = CMU_HFPERCLKEN0_I2C0 | CMU_HFPERCLKEN0_GPIO;
     GPIO->PD_MODEH = 8u << 24 | 8u << 28;
     I2C0->ROUTE = I2C_ROUTE_SDAPEN | I2C_ROUTE_SCLPEN | 3 << 8;
@@ -135,8 +129,7 @@ static uint32_t descriptors[128] __attribute__((aligned(512)));
 static volatile uint16_t samples[2][8];
 static volatile uint32_t halves;
 
-void IRQ(void)
-{
+void IRQ(void) {
     if (!(DMA->IF & 1))
         return;
     DMA->IFC = 1;
@@ -152,8 +145,7 @@ void IRQ(void)
     RESULT[0] = halves;
 }
 
-int main(void)
-{
+int main(void) {
     CMU->HFPERCLKEN0 = CMU_HFPERCLKEN0_TIMER0 | CMU_HFPERCLKEN0_ADC0 | CMU_HFPERCLKEN0_PRS;
     CMU->HFCORECLKEN0 = CMU_HFCORECLKEN0_DMA;
     for (int half = 0; half < 2; half++) {
@@ -196,8 +188,7 @@ CAPTURE = """
 /* Width of pulses at PA0 by input capture, and an answer at each by a PWM at PA1. */
 static volatile uint32_t rise, count;
 
-void IRQ(void)
-{
+void IRQ(void) {
     TIMER0->IFC = TIMER_IFC_CC0;
     while (TIMER0->STATUS & TIMER_STATUS_ICV0) {
         uint32_t at = TIMER0->CC0_CCV;
@@ -210,8 +201,7 @@ void IRQ(void)
     RESULT[0] = count;
 }
 
-int main(void)
-{
+int main(void) {
     CMU->HFPERCLKEN0 = CMU_HFPERCLKEN0_TIMER0 | CMU_HFPERCLKEN0_GPIO;
     GPIO->PA_MODEL = 1;
     TIMER0->ROUTE = TIMER_ROUTE_CC0PEN;

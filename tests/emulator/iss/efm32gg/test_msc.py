@@ -7,7 +7,7 @@ import pytest
 from cubestack.emulator.iss.outcome import OutgoingKind
 from tests.emulator.iss.cross_compiler import needs_compiler
 
-from .bench import MS, US, Bench, compiled
+from .bench import MS, US, Bench, compiled, mask_of
 
 PAGE = 0x8_0000
 UNLOCK = 0x1B71
@@ -15,15 +15,13 @@ UNLOCK = 0x1B71
 
 def erased(bench: Bench, page: int = PAGE) -> Bench:
     """Start to erase a page."""
-    bench.load("MSC", WRITECTRL=1, ADDRB=page)
-    bench.command("MSC.WRITECMD.LADDRIM")
+    bench.load("MSC", WRITECTRL=1, ADDRB=page, WRITECMD=mask_of("MSC.WRITECMD.LADDRIM"))
     bench.command("MSC.WRITECMD.ERASEPAGE")
     return bench
 
 
 def write_word(bench: Bench, address: int, value: int) -> None:
-    bench.load("MSC", WRITECTRL=1, ADDRB=address)
-    bench.command("MSC.WRITECMD.LADDRIM")
+    bench.load("MSC", WRITECTRL=1, ADDRB=address, WRITECMD=mask_of("MSC.WRITECMD.LADDRIM"))
     bench["MSC.WDATA"] = value
     bench.command("MSC.WRITECMD.WRITEONCE")
 
@@ -65,8 +63,7 @@ def test_word_write_takes_20_us_and_only_clears_bits() -> None:
 
 def test_sequence_of_words_fills_consecutive_addresses() -> None:
     bench = Bench()
-    bench.load("MSC", WRITECTRL=1, ADDRB=PAGE)
-    bench.command("MSC.WRITECMD.LADDRIM")
+    bench.load("MSC", WRITECTRL=1, ADDRB=PAGE, WRITECMD=mask_of("MSC.WRITECMD.LADDRIM"))
     words = [0x1111_1111, 0x2222_2222, 0x3333_3333]
     for word in words:
         while not bench.is_set("MSC.STATUS.WDATAREADY"):
@@ -141,23 +138,20 @@ def test_bus_writes_to_the_flash_are_ignored_or_a_fault() -> None:
 
 FROM_RAM = """
 static volatile uint32_t ticks;
-IN_RAM static void put(uint32_t address, uint32_t word)
-{
+IN_RAM static void put(uint32_t address, uint32_t word) {
     MSC->WRITECTRL = MSC_WRITECTRL_WREN;
     MSC->ADDRB = address;
     MSC->WRITECMD = MSC_WRITECMD_LADDRIM;
     if (MSC->STATUS & (MSC_STATUS_INVADDR | MSC_STATUS_LOCKED))
         return;
-    while (!(MSC->STATUS & MSC_STATUS_WDATAREADY))
-        ;
+    while (!(MSC->STATUS & MSC_STATUS_WDATAREADY)) ;
     MSC->WDATA = word;
     MSC->WRITECMD = MSC_WRITECMD_WRITEONCE;
     while (MSC->STATUS & MSC_STATUS_BUSY)
         ticks++;
     MSC->WRITECTRL = 0;
 }
-int main(void)
-{
+int main(void) {
     MSC->LOCK = 0x1B71;
     for (uint32_t n = 0; n < 8; n++)
         put(0x80000 + 4 * n, n * 0x01010101u);

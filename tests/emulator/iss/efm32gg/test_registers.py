@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from cubestack.emulator.native.compiler import find_compiler
-from cubestack.firmware_model.interface.efm32gg import LAYOUTS, register_at
+from cubestack.firmware_model.interface.efm32gg import LAYOUTS
 from cubestack.firmware_model.interface.efm32gg.c_header import c_header
 from cubestack.firmware_model.interface.efm32gg.table import (
     Instance,
@@ -148,13 +148,6 @@ def test_instances_do_not_overlap_and_names_are_unique() -> None:
     lines = [number for _, instance in UNITS for number in instance.interrupts.values()]
     assert {number for number in lines if lines.count(number) > 1} == {6}  # both comparators
     assert max(lines) == 38
-
-
-def test_register_by_address() -> None:
-    found = register_at(0x400C_802C)
-    assert found is not None
-    assert (found[0].name, found[1].name) == ("CMU", "STATUS")
-    assert register_at(0x4000_3000) is None
 
 
 @pytest.mark.parametrize(

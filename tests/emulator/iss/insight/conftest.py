@@ -4,11 +4,25 @@ from pathlib import Path
 import pytest
 
 from cubestack.emulator.iss.image import load_image
+from cubestack.emulator.iss.insight.fault_report import unhandled
 from cubestack.emulator.iss.insight.symbols import Symbols
 from cubestack.emulator.iss.machine import Machine
+from cubestack.emulator.iss.outcome import StopReason
 from tests.emulator.iss.cross_compiler import COMPILER, compile_for_m3
 
 HERE = Path(__file__).parent
+PS_PER_MS = 10**9
+MOST_RUNS = 10_000
+
+
+def run(machine: Machine, until_ps: int) -> None:
+    """Run to a time, or to a fault handler that does not return."""
+    for _ in range(MOST_RUNS):
+        stop = machine.run(until_ps)
+        list(machine.outbox())
+        if stop.now_ps >= until_ps or stop.reason is StopReason.LOCKED_UP or unhandled(machine):
+            return
+    pytest.fail(f"time stays at {machine.now_ps} ps")
 
 
 @pytest.fixture(scope="session")

@@ -3,21 +3,10 @@ import pytest
 from cubestack.emulator.iss.insight.fault_report import fault_report, last_fault, reasons, unhandled
 from cubestack.emulator.iss.insight.symbols import Symbols
 from cubestack.emulator.iss.machine import Machine
-from cubestack.emulator.iss.outcome import StopReason
 
-PS_PER_MS = 10**9
-MOST_RUNS = 10_000
+from .conftest import PS_PER_MS, run
+
 SCREEN_LINES = 32
-
-
-def run(machine: Machine, until_ps: int) -> None:
-    """Run to a time, or to a fault handler that does not return."""
-    for _ in range(MOST_RUNS):
-        stop = machine.run(until_ps)
-        list(machine.outbox())
-        if stop.now_ps >= until_ps or stop.reason is StopReason.LOCKED_UP or unhandled(machine):
-            return
-    pytest.fail(f"time stays at {machine.now_ps} ps")
 
 
 def crash(machine: Machine, symbols: Symbols, how: int) -> str:

@@ -16,20 +16,11 @@ from cubestack.emulator.iss.insight.symbols import Symbols
 from cubestack.emulator.iss.machine import RAM_BASE, Machine
 from tests.emulator.iss.cross_compiler import compile_for_m3, needs_compiler
 
-PS_PER_MS = 10**9
-MOST_RUNS = 10_000
+from .conftest import PS_PER_MS, run
+
 RUN_PS = 20 * PS_PER_MS  # 200 ticks
 RAM_BYTES = 128 * 1024
 HEAP_BYTES = 100
-
-
-def run(machine: Machine, until_ps: int) -> None:
-    for _ in range(MOST_RUNS):
-        machine.run(until_ps)
-        list(machine.outbox())
-        if machine.now_ps >= until_ps:
-            return
-    pytest.fail(f"time stays at {machine.now_ps} ps")
 
 
 @pytest.fixture
