@@ -34,3 +34,11 @@ def test_source_distribution_has_every_file(tmp_path: Path) -> None:
     assert files <= packed
     added = {name for name in packed - files if ".egg-info/" not in name}
     assert added == {"PKG-INFO", "setup.cfg"}
+
+
+@pytest.mark.xdist_group("kept together")
+def test_groups_are_known(request: pytest.FixtureRequest) -> None:
+    """Some versions of pytest and xdist ignore groups without a warning."""
+    if not request.config.getoption("loadgroup", False):
+        pytest.skip("tests run in one process or without groups")
+    assert request.node.nodeid.endswith("@kept together")
