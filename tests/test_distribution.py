@@ -9,7 +9,7 @@ import pytest
 ROOT = Path(__file__).parent.parent
 
 
-def kept() -> set[str]:
+def files_of_the_clone() -> set[str]:
     """Files in git; empty outside a clone."""
     call = ["git", "-C", str(ROOT), "ls-files", "-z"]
     if shutil.which("git") is None or not (ROOT / ".git").exists():
@@ -19,7 +19,7 @@ def kept() -> set[str]:
 
 
 def test_source_distribution_has_every_file(tmp_path: Path) -> None:
-    files = kept()
+    files = files_of_the_clone()
     if not files:
         pytest.skip("this is no clone")
     tree = tmp_path / "tree"
