@@ -8,7 +8,7 @@ from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
 from cubestack.host.clients.registers import RegisterClient, RegisterLine
 from cubestack.host.errors import NoAnswerError
 
-from ..conftest import Slave
+from ..conftest import Line, Slave
 
 
 @pytest.fixture
@@ -91,24 +91,18 @@ def test_silent_address_is_named(slave: Slave) -> None:
     assert len(slave.waits) == 2
 
 
-class Line:
-    """A serial line that answers in pieces of 5000 bytes; the first ``failures`` are cut short."""
+class Answering(Line):
+    """Answers in pieces of 5000 bytes; the first ``failures`` answers are cut short."""
 
     def __init__(self, answer: bytes, failures: int = 0) -> None:
+        super().__init__()
         self.answer, self.failures, self.written = answer, failures, b""
-        self.waited_s = 0.0
-        self._coming = b""
+        self.chunk = 5000
 
     def write(self, data: bytes) -> None:
         self.written += data
         self.failures -= 1
-        self._coming = self.answer if self.failures < 0 else self.answer[:1]
-
-    def read(self, max_bytes: int, timeout_s: float) -> bytes:
-        self.waited_s += 0 if self._coming else timeout_s
-        count = min(max_bytes, 5000) if timeout_s else 0
-        data, self._coming = self._coming[:count], self._coming[count:]
-        return data
+        self.pending[:] = self.answer if self.failures < 0 else self.answer[:1]
 
     def close(self) -> None:
         raise AssertionError("the line stays its owner's")
@@ -116,7 +110,7 @@ class Line:
 
 def test_registers_on_a_serial_line() -> None:
     picture = np.random.default_rng(2).integers(0, 256, 307_200, np.uint8).tobytes()
-    line = Line(picture, failures=1)
+    line = Answering(picture, failures=1)
     client = RegisterClient(RegisterLine(line), REGISTERS, wait=lambda _s: None)
     assert client.read_stream("IMAGE") == picture
     assert line.written == bytes([0x39, 0x60]) * 2
@@ -124,7 +118,9 @@ def test_registers_on_a_serial_line() -> None:
     assert client.read("nadir_x") == -12.34
     client.write("SUN_THRESHOLD", 85)
     assert line.written[4:] == bytes([0x39, REGISTERS["NADIR_X"].address, 0x38, 0, 85])
-    assert line.waited_s == 1.0  # for the rest of the answer that failed; never before a request
+    assert (
+        sum(line.silences) == 1.0
+    )  # for the rest of the answer that failed; never before a request
     line.answer = b""
     with pytest.raises(NoAnswerError, match="register SUN_X not acknowledged at I2C address 0x1c"):
         client.read("SUN_X")

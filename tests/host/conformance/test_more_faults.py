@@ -4,34 +4,21 @@ from typing import Any
 
 import pytest
 
-from cubestack.firmware_model.interface.codec.register_pointer import FILL
-from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
-from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
 from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
 from cubestack.firmware_model.interface.cubestar import ResetCause
 from cubestack.host.clients.node import NodeClient
-from cubestack.host.clients.registers import RegisterClient, RegisterLine
 from cubestack.host.conformance import contract
-from cubestack.host.conformance.contract import CheckResult, CheckRun, FailedError, Verdict
+from cubestack.host.conformance.contract import CheckResult, FailedError
 from cubestack.host.conformance.effects import check_watchdog
-from cubestack.host.conformance.suite import check_reads, run_suite
+from cubestack.host.conformance.suite import run_suite
 from cubestack.host.devices.device import ConformanceNotes
 from cubestack.host.devices.registry import device
 from cubestack.host.devices.shown_settings import read_back
 from cubestack.host.errors import NoAnswerError
 from cubestack.host.targets import Target
-from tests.host.conformance.test_suite import SMALL, good, spoil, suite
-from tests.host.conformance.test_suite import failures as all_failures
-from tests.host.conftest import FakeNode, Line, Slave, UartLink
+from tests.host.conformance.test_suite import SMALL, failures, good, spoil, suite
 
 __all__ = ["good"]
-
-
-def failures(run: CheckRun) -> dict[str, str]:
-    """What failed, except response times, which depend on the load of the machine."""
-    found = all_failures(run)
-    found.pop("times of answers", None)
-    return found
 
 
 def damage_block(node: Any, values: dict[str, Any]) -> None:
@@ -58,7 +45,7 @@ def change_switch(node: Any, _values: dict[str, Any]) -> None:
     ],
 )
 def test_wrong_effect_of_a_telecommand_is_found(
-    good: Any, uart: Any, monkeypatch: pytest.MonkeyPatch, name: str, effect: Any, detail: str
+    good: Any, uart: Any, monkeypatch: Any, name: str, effect: Any, detail: str
 ) -> None:
     spoil(monkeypatch, good, name, partial(effect, good))
     found = failures(suite(good, uart, allow_write=True))
@@ -78,9 +65,7 @@ def test_earlier_watchdog_resets_are_not_cleared(
     assert names == ["TestWDG", *(["ClearWDGResetCounter"] if cleared else [])]
 
 
-def test_refusal_that_changes_a_setting_is_found(
-    good: Any, uart: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_refusal_that_changes_a_setting_is_found(good: Any, uart: Any, monkeypatch: Any) -> None:
     answer, message = good.answer, CUBESTAR.telecommand("setIDMode")
     ((telemetry, field),) = read_back(CUBESTAR, message, SMALL).values()
 
@@ -178,88 +163,3 @@ def test_notes_of_a_known_device_are_used(good: Any, uart: Any, known: bool) -> 
     assert run.checks == told
     assert len(told) > len(CUBESTAR.telecommands)
     assert not run.allow_write
-
-
-# --- registers ------------------------------------------------------------------------------------
-
-
-class Filled(Slave):
-    """Registers with valid values; other addresses return the fill byte."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        for one in REGISTERS:
-            if one.readable and not one.streams:
-                least = int(max(one.field.low, 0))
-                self.content[one.address] = least.to_bytes(one.length, "big")
-
-
-def reads(slave: Any, *, line: bool = False) -> dict[str, CheckResult]:
-    node = NodeClient(UartLink(FakeNode(CUBESENSE)), CUBESENSE, retries=0)
-    bus = RegisterLine(slave, timeout_s=0.0) if line else slave
-    registers = RegisterClient(bus, REGISTERS, retries=0, wait=lambda _s: None)
-    run = CheckRun(Target("fake", CUBESENSE, node, registers=registers))
-    check_reads(run)
-    return {one.name: one for one in run.checks if one.name.startswith("register")}
-
-
-def test_every_readable_register_is_checked() -> None:
-    found = reads(Filled())
-    names = {f"register {one.name}" for one in REGISTERS if one.readable and not one.streams}
-    assert names < set(found)
-    (unused,) = set(found) - names
-    assert "without a register" in unused
-    assert {one.verdict for one in found.values()} == {Verdict.PASSED}
-    assert found[unused].detail == bytes([FILL, FILL]).hex()
-
-
-NARROW = [
-    one.name
-    for one in REGISTERS
-    if one.readable and one.writable and not one.field.allows(one.decode(b"\xff"), {})
-]
-
-
-@pytest.mark.parametrize("name", NARROW)
-def test_invalid_register_value_is_found(name: str) -> None:
-    slave, register = Filled(), REGISTERS[name]
-    slave.content[register.address] = b"\xff"
-    found = reads(slave)
-    wrong = {one.name: one.detail for one in found.values() if one.verdict is Verdict.FAILED}
-    assert set(wrong) == {f"register {name}"}
-    assert wrong[f"register {name}"].endswith(" is not allowed")
-
-
-def test_value_at_an_unused_address_is_found() -> None:
-    slave = Filled()
-    unused = max(address for address in range(256) if REGISTERS.at(address) is None)
-    slave.content[unused] = b"\x12\x34"
-    found = reads(slave)[f"register address {unused:#04x} without a register"]
-    assert (found.verdict, found.detail) == (
-        Verdict.FAILED,
-        f"read 1234, declared {FILL:#04x} in each byte",
-    )
-
-
-class Uart(Line):
-    """Registers on a serial line; with ``talks``, unused addresses are answered too."""
-
-    talks = False
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.slave = Filled()
-
-    def write(self, data: bytes) -> None:
-        _, address = data
-        self.pending += self.slave.content.get(address, b"\x12\x34" if self.talks else b"")
-
-
-@pytest.mark.parametrize("talks", [False, True])
-def test_register_line_must_not_answer_unused_addresses(talks: bool) -> None:
-    line = Uart()
-    line.talks = talks
-    (found,) = (one for name, one in reads(line, line=True).items() if "without" in name)
-    verdict = Verdict.FAILED if talks else Verdict.PASSED
-    detail = "read 1234, declared no answer" if talks else "no answer"
-    assert (found.verdict, found.detail) == (verdict, detail)

@@ -3,15 +3,17 @@ from typing import Any
 
 import pytest
 
+from cubestack.firmware_model.interface.codec.register_pointer import FILL
 from cubestack.firmware_model.interface.cubesense import INTERFACE
 from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
 from cubestack.host.clients.node import NodeClient
-from cubestack.host.clients.registers import RegisterClient
+from cubestack.host.clients.registers import RegisterClient, RegisterLine
 from cubestack.host.conformance.contract import CheckResult, CheckRun, Verdict
+from cubestack.host.conformance.suite import check_reads
 from cubestack.host.conformance.writes import check_writes
 from cubestack.host.devices.device import ConformanceNotes
 from cubestack.host.targets import Target
-from tests.host.conftest import FakeNode, LetterLine, Slave, UartLink
+from tests.host.conftest import FakeNode, LetterLine, Line, Slave, UartLink
 
 #: Of CubeSense without most of its messages, which other tests walk.
 BARE = replace(INTERFACE, telecommands=(), telemetries=INTERFACE.telemetries[:1])
@@ -21,7 +23,7 @@ LETTERS = INTERFACE.service_port.letters
 
 
 class Registers(Slave):
-    """Registers that ignore invalid values.
+    """Registers with valid values, which ignore others.
 
     Attributes:
         kept: names of registers that no write changes.
@@ -32,8 +34,10 @@ class Registers(Slave):
         super().__init__()
         self.kept: set[str] = set()
         self.takes_all = False
-        for one in SETTINGS:
-            self.content[one.address] = bytes([int(one.field.reset or one.field.ends[0] or 0)])
+        for one in REGISTERS:
+            if one.readable and not one.streams:
+                least = int(one.field.reset or max(one.field.low, 0))
+                self.content[one.address] = least.to_bytes(one.length, "big")
 
     def i2c_rdwr(self, *messages: Any) -> None:
         before = dict(self.content)
@@ -144,3 +148,74 @@ def test_answer_to_an_unknown_letter_is_found(slave: Registers, bench: LetterLin
 
     found = failed(checked(slave, Chatty(**bench.answers)))
     assert found["bench: no letter of the protocol"].endswith("was answered with 3 bytes")
+
+
+def reads(slave: Any, *, line: bool = False) -> dict[str, CheckResult]:
+    node = NodeClient(UartLink(FakeNode(INTERFACE)), INTERFACE, retries=0)
+    bus = RegisterLine(slave, timeout_s=0.0) if line else slave
+    registers = RegisterClient(bus, REGISTERS, retries=0, wait=lambda _s: None)
+    run = CheckRun(Target("fake", INTERFACE, node, registers=registers))
+    check_reads(run)
+    return {one.name: one for one in run.checks if one.name.startswith("register")}
+
+
+def test_every_readable_register_is_checked() -> None:
+    found = reads(Registers())
+    names = {f"register {one.name}" for one in REGISTERS if one.readable and not one.streams}
+    assert names < set(found)
+    (unused,) = set(found) - names
+    assert "without a register" in unused
+    assert {one.verdict for one in found.values()} == {Verdict.PASSED}
+    assert found[unused].detail == bytes([FILL, FILL]).hex()
+
+
+NARROW = [
+    one.name
+    for one in REGISTERS
+    if one.readable and one.writable and not one.field.allows(one.decode(b"\xff"), {})
+]
+
+
+@pytest.mark.parametrize("name", NARROW)
+def test_invalid_register_value_is_found(name: str) -> None:
+    slave, register = Registers(), REGISTERS[name]
+    slave.content[register.address] = b"\xff"
+    found = reads(slave)
+    wrong = {one.name: one.detail for one in found.values() if one.verdict is Verdict.FAILED}
+    assert set(wrong) == {f"register {name}"}
+    assert wrong[f"register {name}"].endswith(" is not allowed")
+
+
+def test_value_at_an_unused_address_is_found() -> None:
+    slave = Registers()
+    unused = max(address for address in range(256) if REGISTERS.at(address) is None)
+    slave.content[unused] = b"\x12\x34"
+    found = reads(slave)[f"register address {unused:#04x} without a register"]
+    assert (found.verdict, found.detail) == (
+        Verdict.FAILED,
+        f"read 1234, declared {FILL:#04x} in each byte",
+    )
+
+
+class Uart(Line):
+    """Registers on a serial line; with ``talks``, unused addresses are answered too."""
+
+    talks = False
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.slave = Registers()
+
+    def write(self, data: bytes) -> None:
+        _, address = data
+        self.pending += self.slave.content.get(address, b"\x12\x34" if self.talks else b"")
+
+
+@pytest.mark.parametrize("talks", [False, True])
+def test_register_line_must_not_answer_unused_addresses(talks: bool) -> None:
+    line = Uart()
+    line.talks = talks
+    (found,) = (one for name, one in reads(line, line=True).items() if "without" in name)
+    verdict = Verdict.FAILED if talks else Verdict.PASSED
+    detail = "read 1234, declared no answer" if talks else "no answer"
+    assert (found.verdict, found.detail) == (verdict, detail)

@@ -95,10 +95,12 @@ def good(node, uart, monkeypatch):
     return node
 
 
-def failures(run: CheckRun) -> dict[str, str]:
+def failures(run: CheckRun, without: str = "times of answers") -> dict[str, str]:
+    """What failed, except response times, which depend on the load of the machine."""
     check_reads(run)
     check_writes(run)
-    return {c.name: c.detail for c in run.checks if c.verdict is Verdict.FAILED}
+    failed = {c.name: c.detail for c in run.checks if c.verdict is Verdict.FAILED}
+    return {name: detail for name, detail in failed.items() if name != without}
 
 
 def test_good_node_passes(good, uart):
@@ -255,20 +257,23 @@ def test_deaf_decoder_is_found(good, uart, monkeypatch):
     assert set(failures(suite(good, uart))) == {"framing: noise before a frame"}
 
 
-@pytest.mark.parametrize(("late", "failed"), [(1, False), (3, True)])
-def test_late_answers_are_found_unless_they_are_single(good, uart, monkeypatch, late, failed):
-    run, now_s, left = suite(good, uart), [0.0], [late]
-    monkeypatch.setattr(run, "now_s", lambda: now_s[0])
-    answer = good.answer
+def delay(monkeypatch, node, run, when):
+    """Let an answer take 0.1 s for which ``when(request)`` is true."""
+    now_s, answer = [0.0], node.answer
 
     def slow(payload):
-        if payload == b"\x87" and left[0]:
-            left[0] -= 1
-            now_s[0] += 0.1
+        now_s[0] += 0.1 if when(payload) else 0
         return answer(payload)
 
-    monkeypatch.setattr(good, "answer", slow)
-    assert ("times of answers" in failures(run)) is failed
+    monkeypatch.setattr(run, "now_s", lambda: now_s[0])
+    monkeypatch.setattr(node, "answer", slow)
+
+
+@pytest.mark.parametrize(("late", "failed"), [(1, False), (3, True)])
+def test_late_answers_are_found_unless_they_are_single(good, uart, monkeypatch, late, failed):
+    run, left = suite(good, uart), [True] * late
+    delay(monkeypatch, good, run, lambda payload: payload == b"\x87" and left and left.pop())
+    assert ("times of answers" in failures(run, without="")) is failed
 
 
 @pytest.mark.parametrize("interface", [CUBESTAR, CUBESENSE, ARAMIS], ids=lambda i: i.name)
@@ -307,15 +312,7 @@ def test_comparison_shows_the_first_difference():
 
 @pytest.mark.parametrize("name", ["Identification", "StarDetails"])
 def test_telemetry_with_side_effects_is_requested_once(good, uart, monkeypatch, name):
-    run, now_s, asked = suite(good, uart), [0.0], []
-    message, answer = good.interface.telemetry(name), good.answer
-    monkeypatch.setattr(run, "now_s", lambda: now_s[0])
-
-    def slow(payload):
-        asked.append(payload)
-        now_s[0] += 0.1
-        return answer(payload)
-
-    monkeypatch.setattr(good, "answer", slow)
-    run.telemetry(message)
+    run, asked = suite(good, uart), []
+    delay(monkeypatch, good, run, lambda payload: not asked.append(payload))
+    run.telemetry(good.interface.telemetry(name))
     assert len(asked) == (1 if name == "StarDetails" else 3)

@@ -141,7 +141,6 @@ def test_device_without_switches_rejects_a_profile(tmp_path: Path) -> None:
         power_up(plain, tmp_path / "sky.toml")
 
 
-@pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_profile_sums_the_cycles_of_all_devices(tmp_path: Path, count: int) -> None:
     path, cycles = tmp_path / "profile", 0

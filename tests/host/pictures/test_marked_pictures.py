@@ -205,6 +205,7 @@ def test_nadir_is_marked_and_captioned(tmp_path: Path, written: list[Text]) -> N
     fitted, truth = (10.0, -5.0, 0.0), (-20.0, 15.0)
     annotate_nadir(SENSE, np.array([[50.0, 70.0]]), fitted, tmp_path / "n.png", "Earth", truth)
     image = opened(tmp_path / "n.png")
+    assert middle(image, EDGE) == pytest.approx((50, 70), abs=1)
     for colour, angles in ((FITTED, fitted[:2]), (TRUTH, truth)):
         place = pixel(Camera.NADIR, direction(*angles)[None])[0]
         assert middle(image, colour) == pytest.approx(place, abs=1)
@@ -257,6 +258,8 @@ def test_missing_earth_is_captioned(tmp_path: Path, written: list[Text]) -> None
     assert "0 edges found; no Earth found" in written
     assert "centre found" not in written
     assert "boresight, angles from it" in written
+    annotate_nadir(SENSE, np.array([[50.0, 70.0]]), None, tmp_path / "n.png")
+    assert middle(opened(tmp_path / "n.png"), EDGE) == pytest.approx((50, 70), abs=1)
 
 
 @pytest.mark.parametrize("first", [(100, 90), (500, 90), (100, 400), (500, 400)])
@@ -325,8 +328,11 @@ def test_window_at_the_border_is_enlarged(first: tuple[int, int], tmp_path: Path
 def test_missing_sun_is_captioned(tmp_path: Path, written: list[Text]) -> None:
     annotate_sun(SENSE, (0x3FF, 0x1FF), None, tmp_path / "s.png")
     image = opened(tmp_path / "s.png")
-    assert not len(ink(image, EDGE, 960)) + len(ink(image, FITTED, 960))
+    assert not any(len(ink(image, colour, 960)) for colour in (EDGE, FITTED, TRUTH))
     assert "no Sun found" in written
     assert "sun camera" in written
     assert "centroid found" not in written
     assert "boresight, angles from it" in written
+    annotate_sun(SENSE, (0x3FF, 0x1FF), None, tmp_path / "s.png", "Sun", (20.0, 10.0))
+    place = pixel(Camera.SUN, direction(20.0, 10.0)[None])[0]
+    assert middle(opened(tmp_path / "s.png"), TRUTH) == pytest.approx(place, abs=1)

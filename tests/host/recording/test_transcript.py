@@ -15,14 +15,14 @@ from cubestack.firmware_model.formats.recording import (
 )
 from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.firmware_model.interface.codec.message import Interface, Message
-from cubestack.host.cli.main import main
 from cubestack.host.clients.i2c import I2cClient
 from cubestack.host.devices.registry import device, device_names
 from cubestack.host.emulation.emulated import open_device
 from cubestack.host.emulation.records import start_recorder
 from cubestack.host.recording.transcript import COLUMNS, LINE, TranscriptEntry, transcript
+from tests.conftest import Run
 
-INTERFACE = device("cubesense").interface
+INTERFACE, CUBESTAR = (device(name).interface for name in ("cubesense", "cubestar"))
 CONFIGURATION = INTERFACE.telemetry("Configuration")
 THRESHOLD = INTERFACE.telecommand("DetectionThreshold1")
 BYTE_PS = 173_611_111
@@ -121,10 +121,10 @@ def recording(tmp_path: Path) -> Path:
     return path
 
 
-def test_decode_writes_one_row_per_field(recording: Path, tmp_path: Path) -> None:
+def test_decode_writes_one_row_per_field(run: Run, recording: Path, tmp_path: Path) -> None:
     arrow = pytest.importorskip("pyarrow.parquet")
     for end in ("csv", "parquet"):
-        assert main(["decode", str(recording), "--out", str(tmp_path / f"a.{end}")]) == 0
+        assert run("decode", recording, "--out", tmp_path / f"a.{end}").code == 0
     with (tmp_path / "a.csv").open(newline="") as stream:
         rows = list(csv.DictReader(stream))
     columns = arrow.read_table(tmp_path / "a.parquet").to_pylist()
@@ -136,21 +136,16 @@ def test_decode_writes_one_row_per_field(recording: Path, tmp_path: Path) -> Non
         assert (table[-1]["error"], float(table[-1]["value"])) == ("no acknowledge", 9.0)
 
 
-def test_decode_prints_text_and_json(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["decode", str(recording)]) == 0
-    first, second = capsys.readouterr().out.splitlines()
+def test_decode_prints_text_and_json(run: Run, recording: Path) -> None:
+    first, second = run("decode", recording).out.splitlines()
     assert "telemetry Configuration: " in first
     assert second.endswith("telecommand DetectionThreshold1 (no acknowledge): Threshold 9 DN")
-    assert main(["decode", str(recording), "--json"]) == 0
-    objects = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    objects = [json.loads(line) for line in run("decode", recording, "--json").out.splitlines()]
     assert objects[1]["values"] == {"Threshold": 9}
 
 
-def test_decode_rejects_other_file_types(
-    recording: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["decode", str(recording), "--out", "a.xls"]) != 0
-    assert "a.xls: a table is .csv or .parquet" in capsys.readouterr().err
+def test_decode_rejects_other_file_types(run: Run, recording: Path) -> None:
+    assert "a.xls: a table is .csv or .parquet" in run("decode", recording, "--out", "a.xls").line
 
 
 MESSAGES = [
@@ -199,20 +194,16 @@ def test_message_without_values_has_one_row() -> None:
 
 
 def test_read_without_a_request_is_ignored() -> None:
-    interface = device("cubestar").interface
-    assert told(interface, transfer(interface, (b"abc", True))) == []
-    (one,) = told(interface, transfer(interface, (b"\x7e", False)))
+    assert told(CUBESTAR, transfer(CUBESTAR, (b"abc", True))) == []
+    (one,) = told(CUBESTAR, transfer(CUBESTAR, (b"\x7e", False)))
     assert (one.kind, one.name, one.error) == ("unknown", "126", "not in the tables")
 
 
 def test_telecommand_on_the_bus_has_its_parameters() -> None:
-    interface = device("cubestar").interface
-    message = interface.telecommand("setIDMode")
+    message = CUBESTAR.telecommand("setIDMode")
     data = bytes([message.id]) + message.pack(**message.reset_values())
-    (one,) = told(interface, transfer(interface, (data, False)))
-    assert (one.kind, one.name, dict(one.values)) == (
-        *("telecommand", "setIDMode"),
-        message.reset_values(),
-    )
-    (short,) = told(interface, transfer(interface, (data + b"x", False)))
+    (one,) = told(CUBESTAR, transfer(CUBESTAR, (data, False)))
+    assert (one.kind, one.name) == ("telecommand", "setIDMode")
+    assert one.values == message.reset_values()
+    (short,) = told(CUBESTAR, transfer(CUBESTAR, (data + b"x", False)))
     assert short.error == f"{len(data)} bytes, not {len(data) - 1}"

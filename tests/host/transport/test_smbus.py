@@ -5,6 +5,7 @@ import socket
 import stat
 import threading
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -149,43 +150,38 @@ def test_missing_emulation_is_reported(bus: int | str) -> None:
         CubeSMBus(bus)
 
 
-@pytest.fixture
-def server(tmp_path: Path) -> Iterator[socket.socket]:
+@contextmanager
+def answering(path: Path, reply: bytes) -> Iterator[str]:
+    """A socket that answers the first request of one client."""
+
+    def answer() -> None:
+        with listening.accept()[0] as connection:
+            connection.recv(1 << 12)
+            connection.sendall(reply)
+
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as listening:
-        listening.bind(str(tmp_path / "bus"))
+        listening.bind(str(path))
         listening.listen()
-        yield listening
+        serving = threading.Thread(target=answer)
+        serving.start()
+        yield str(path)
+        serving.join()
 
 
 @pytest.mark.parametrize("reply", [b"", b"\x01", b"\x10\x00\x00\x00abc"])
-def test_emulation_that_ends_during_an_answer(
-    server: socket.socket, tmp_path: Path, reply: bytes
-) -> None:
-    def answer() -> None:
-        connection = server.accept()[0]
-        with connection:
-            connection.recv(1 << 12)
-            if reply:
-                connection.sendall(reply)
-
-    serving = threading.Thread(target=answer)
-    serving.start()
-    with pytest.raises(PortClosedError, match="the emulation has ended"):
-        CubeSMBus(str(tmp_path / "bus"))
-    serving.join()
+def test_emulation_that_ends_during_an_answer(tmp_path: Path, reply: bytes) -> None:
+    with (
+        answering(tmp_path / "bus", reply) as path,
+        pytest.raises(PortClosedError, match="the emulation has ended"),
+    ):
+        CubeSMBus(path)
 
 
-def test_open_bus_has_a_file_descriptor(server: socket.socket, tmp_path: Path) -> None:
-    def answer() -> None:
-        with server.accept()[0] as connection:
-            connection.recv(1 << 12)
-            functions = linux_i2c.reply(0, bytes(8))
-            connection.sendall(linux_i2c.LENGTH.pack(len(functions)) + functions)
-
-    serving = threading.Thread(target=answer)
-    serving.start()
-    bus = CubeSMBus(str(tmp_path / "bus"))
-    serving.join()
+def test_open_bus_has_a_file_descriptor(tmp_path: Path) -> None:
+    functions = linux_i2c.reply(0, bytes(8))
+    reply = linux_i2c.LENGTH.pack(len(functions)) + functions
+    with answering(tmp_path / "bus", reply) as path:
+        bus = CubeSMBus(path)
     assert stat.S_ISSOCK(os.fstat(bus.fd).st_mode)
     bus.close()
     assert bus.fd is None

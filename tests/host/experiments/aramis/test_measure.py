@@ -1,6 +1,7 @@
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,10 @@ from cubestack.host.experiments.aramis.measure import (
     EXPERIMENT,
     FIELD_DEG,
     NOISE_TERMS,
+    ROW_S,
+    AramisOptions,
     AramisResult,
+    _configure,
     _is_far,
 )
 from cubestack.host.experiments.measure import measure as measure_device
@@ -146,3 +150,47 @@ def test_summary_counts_far_triangles() -> None:
     assert frame.far is False
     lines = list(EXPERIMENT.summarise([*found, replace(frame, far=True)], 1.0))
     assert lines[-1].endswith("more than a field away: 50.0 %")
+
+
+def sent(**options: Any) -> list[tuple[str, dict[str, Any]]]:
+    said = list[tuple[str, dict[str, Any]]]()
+    client = SimpleNamespace(
+        command=lambda name, **values: said.append((name, values)),
+        wait_processed=lambda timeout_s: said.append(("wait", {"s": timeout_s})),
+    )
+    star_tracker: Any = SimpleNamespace(client=client)
+    _configure(star_tracker, AramisOptions(**options))
+    return said
+
+
+def test_only_changed_settings_are_sent() -> None:
+    (field, values), wait = sent()
+    assert (field, values["FieldOfView"]) == ("SetField", pytest.approx(21.534639))
+    assert wait[0] == "wait"
+    assert [name for name, _ in sent(exposure=100, gain=3.5)] == [
+        *("SetField", "SetExposure", "SetGain", "wait")
+    ]
+    assert sent(gain=3.5)[1] == ("SetGain", {"Gain": 3.5})
+
+
+@pytest.mark.parametrize("exposure_ms", [0.001, 1.0, 20.0, 200.0])
+def test_exposure_is_rounded_to_rows(exposure_ms: float) -> None:
+    rows = sent(exposure=exposure_ms)[1][1]["Rows"]
+    row_ms = 1000 * (1280 + 244) / 48e6
+    assert abs(rows * ROW_S * 1000 - exposure_ms) <= max(ROW_S * 500, row_ms) * 1.001
+    assert rows >= 1
+
+
+FALSE_MAGS = AramisOptions.declared()["false_mags"]
+
+
+@pytest.mark.parametrize("given", ["4.5,6", (4.5, 6), ("4.5", "6")])
+def test_magnitudes_accept_text_and_pairs(given: object) -> None:
+    assert FALSE_MAGS.take(given) == (4.5, 6.0)
+
+
+@pytest.mark.parametrize("given", ["6,4.5", "4.5", "a,b", (6, 4.5)])
+def test_magnitudes_reject_other_orders(given: object) -> None:
+    with pytest.raises(ValueError, match=r"must (be|have) "):
+        FALSE_MAGS.take(given)
+    assert FALSE_MAGS.take("5,5") == (5.0, 5.0)

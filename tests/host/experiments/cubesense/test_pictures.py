@@ -9,17 +9,12 @@ from cubestack.emulator.scene.earth_sun import CameraTarget
 from cubestack.firmware_model.interface.cubesense.codes import Camera
 from cubestack.host.clients.cubesense.client import direction
 from cubestack.host.experiments.cubesense.pictures import (
-    EDGE,
-    FITTED,
     _inset,
     annotate_nadir,
     annotate_sun,
     pixel,
 )
 from cubestack.host.experiments.measure import measure
-from cubestack.host.pictures.sheet import TRUTH
-
-BACKGROUND = 34
 
 
 @pytest.mark.parametrize("camera", Camera)
@@ -29,43 +24,6 @@ def test_pixel_matches_the_lens_of_the_camera(camera: Camera) -> None:
     vectors = np.array([direction(*pair) for pair in angles])
     seen = np.array([LENSES[CameraTarget[camera.name]].project(vector) for vector in vectors])
     np.testing.assert_allclose(pixel(camera, vectors), seen, atol=0.01)
-
-
-def test_nadir_picture_marks_edges_without_a_fit(tmp_path: Path) -> None:
-    picture = np.full((480, 640), BACKGROUND, np.uint8)
-    edges = np.array([[100.0, 50.0]])
-    annotate_nadir(picture, edges, None, tmp_path / "edges.png")
-    annotate_nadir(picture, edges, (0.0, 0.0, 63.5), tmp_path / "both.png")
-    marked, fitted = (np.asarray(Image.open(tmp_path / f"{n}.png")) for n in ("edges", "both"))
-    assert marked.shape[0] > 960
-    assert marked.shape[1:] == (1280, 3)
-    assert np.all(marked[92:112, 192:212].max(axis=(0, 1)) == EDGE)
-    assert np.count_nonzero(fitted[:960] != marked[:960]) > 1000
-
-
-def test_limb_is_drawn_only_with_a_radius(tmp_path: Path) -> None:
-    picture, edges = np.full((480, 640), BACKGROUND, np.uint8), np.zeros((0, 2))
-    green = []
-    for name, radius_deg in (("without", 0.0), ("with", 63.5)):
-        annotate_nadir(picture, edges, (0.0, 0.0, radius_deg), tmp_path / f"{name}.png", "nadir")
-        drawn = np.asarray(Image.open(tmp_path / f"{name}.png"))[:960]
-        green.append(int(np.all(drawn == FITTED, axis=2).sum()))
-    assert green[0] < 150 < 1000 < green[1]
-
-
-def test_truth_is_marked_only_when_known(tmp_path: Path) -> None:
-    picture = np.full((480, 640), BACKGROUND, np.uint8)
-    truth = (20.0, 10.0)
-    annotate_sun(picture, (0x3FF, 0x1FF), None, tmp_path / "not.png")
-    annotate_sun(picture, (0x3FF, 0x1FF), None, tmp_path / "true.png", "sun", truth)
-    unknown, known = (
-        np.all(np.asarray(Image.open(tmp_path / f"{name}.png"))[:960] == TRUTH, axis=2)
-        for name in ("not", "true")
-    )
-    assert not unknown.any()
-    rows, columns = np.nonzero(known)
-    middle = 2 * (pixel(Camera.SUN, direction(*truth)[None])[0] + 0.5)
-    np.testing.assert_allclose((columns.mean(), rows.mean()), middle, atol=1.5)
 
 
 @pytest.mark.parametrize("at", [(100, 100), (500, 100), (100, 400), (500, 400)])

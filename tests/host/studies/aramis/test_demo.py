@@ -1,6 +1,6 @@
 import re
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -37,43 +37,35 @@ class Tracker:
         self.near = list[NDArray[np.float64] | None]()
         self._attitudes = iter(attitudes)
         self.switches: Switches | None = None
-
-    def activate(self) -> CatalogueState:
-        return CatalogueState.GOOD
+        self.activate = lambda: CatalogueState.GOOD
+        self.phase_times = lambda: {"match": 12.0}
+        self.stars = list
+        self.profile = lambda: self.switches
+        self.image = lambda _progress: np.zeros((8, 10), np.uint8)
 
     def measure(self, near: NDArray[np.float64] | None = None) -> Attitude:
         self.near.append(near)
         return next(self._attitudes)
 
-    def phase_times(self) -> dict[str, float]:
-        return {"match": 12.0}
 
-    def stars(self) -> list[Any]:
-        return []
-
-    def profile(self) -> Switches | None:
-        return self.switches
-
-    def image(self, _progress: object) -> NDArray[np.uint8]:
-        return np.zeros((8, 10), np.uint8)
-
-
-def show(monkeypatch: pytest.MonkeyPatch, folder: Path, tracker: Tracker) -> bool:
-    @contextmanager
-    def client(*_: object) -> Iterator[tuple[Tracker, Path]]:
-        yield tracker, folder
-
-    monkeypatch.setattr(demo.Demo, "client", client)
+@pytest.fixture
+def show(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[[Tracker], bool]:
     monkeypatch.setattr(demo, "true_stars", lambda *_: [])
     device: Any = SimpleNamespace(name="aramis")
-    return demo.show(device, folder, 1, None, [])
+
+    def shown(tracker: Tracker) -> bool:
+        client = nullcontext((tracker, tmp_path))
+        monkeypatch.setattr(demo.Demo, "client", lambda *_: client)
+        return demo.show(device, tmp_path, 1, None, [])
+
+    return shown
 
 
 def test_demo_measures_lost_in_space_and_near_a_direction(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    show: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     tracker = Tracker(FOUND, replace(FOUND, quaternion=OFF, matched=8))
-    assert show(monkeypatch, tmp_path, tracker) is True
+    assert show(tracker) is True
     none, near = tracker.near
     assert none is None
     assert near is not None
@@ -92,13 +84,10 @@ def test_demo_measures_lost_in_space_and_near_a_direction(
         assert (tmp_path / name).exists()
 
 
-def test_a_refused_attitude_has_no_error(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    refused = replace(
-        FOUND, valid=False, outcome=MeasurementOutcome.AMBIGUOUS, reason=Reason.SEVERAL
-    )
-    assert show(monkeypatch, tmp_path, Tracker(FOUND, refused)) is False
+def test_a_refused_attitude_has_no_error(show: Any, capsys: pytest.CaptureFixture[str]) -> None:
+    outcome, reason = MeasurementOutcome.AMBIGUOUS, Reason.SEVERAL
+    refused = replace(FOUND, valid=False, outcome=outcome, reason=reason)
+    assert show(Tracker(FOUND, refused)) is False
     told = capsys.readouterr().out.splitlines()
     assert "with a direction 2° off: ambiguous: several" in told
 
@@ -112,11 +101,11 @@ def test_a_refused_attitude_has_no_error(
     ],
 )
 def test_caption_says_that_only_a_triangle_is_named(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, switches: Switches | None, left_out: list[str]
+    monkeypatch: pytest.MonkeyPatch, show: Any, switches: Switches | None, left_out: list[str]
 ) -> None:
     told = list[Any]()
     monkeypatch.setattr(demo, "annotate", lambda *given: told.append(given[4]))
     tracker = Tracker(FOUND, FOUND)
     tracker.switches = switches
-    show(monkeypatch, tmp_path, tracker)
+    show(tracker)
     assert told == [left_out]

@@ -122,20 +122,6 @@ def test_summary_has_the_telecommand_parameters() -> None:
     assert not any("random poses" in line for line in lines)
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"images": "x"}, "--images and --angles are needed together"),
-        ({"angles": "x"}, "--images and --angles are needed together"),
-        ({"images": "x", "angles": "y"}, "--images are of one camera"),
-        ({"images": "x", "angles": "y", "sensor": "sun", "scene": "z"}, "without --scene"),
-    ],
-)
-def test_rejects_options_that_exclude_each_other(options: dict[str, Any], message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        cubesense.CalibrateOptions(**options)
-
-
 class _Named(type(CUBESTAR)):  # type: ignore[misc]
     """A unit that identifies every star exactly; each picture shows another sky."""
 
@@ -175,6 +161,7 @@ def test_principal_point_of_an_emulated_unit_counts_from_the_sensor_corner(
     assert (found.camera["cx_px"], found.camera["cy_px"]) == pytest.approx((530, 240), abs=1e-3)
 
 
+BOTH = {"images": "x", "angles": "y"}
 STARS = CalibrateResult(
     camera={"f_px": 1071.5, "cx_px": 512.25, "k1": -0.1},
     sigma={"f_px": 0.125, "cx_px": 0.25},
@@ -198,16 +185,20 @@ def test_summary_has_the_camera_with_sigmas() -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "message"),
+    ("kind", "options", "message"),
     [
-        ({"images": "x", "scene": "y"}, "--scene requires --emulated"),
-        ({"out": "x.txt"}, "--out must be a file NAME.json"),
-        ({"out": "no/such/x.json"}, "--out must be a file NAME.json"),
+        (CalibrateOptions, {"images": "x", "scene": "y"}, "--scene requires --emulated"),
+        (CalibrateOptions, {"out": "x.txt"}, "--out must be a file NAME.json"),
+        (CalibrateOptions, {"out": "no/such/x.json"}, "--out must be a file NAME.json"),
+        (cubesense.CalibrateOptions, {"images": "x"}, "--images and --angles are needed together"),
+        (cubesense.CalibrateOptions, {"angles": "x"}, "--images and --angles are needed together"),
+        (cubesense.CalibrateOptions, BOTH, "--images are of one camera"),
+        (cubesense.CalibrateOptions, BOTH | {"sensor": "sun", "scene": "z"}, "without --scene"),
     ],
 )
-def test_rejects_invalid_star_tracker_options(options: Any, message: str) -> None:
+def test_rejects_options_that_exclude_each_other(kind: Any, options: Any, message: str) -> None:
     with pytest.raises(ValueError, match=message):
-        CalibrateOptions(**options)
+        kind(**options)
 
 
 def test_pictures_of_a_folder_are_sorted_by_name(tmp_path: Path) -> None:

@@ -23,19 +23,19 @@ def rows(block: int, count: int = 3) -> list[Row]:
     return [Row(block, row, 1, row, {}, "right", "", {"x": 0.1}) for row in range(count)]
 
 
-def test_rows_are_read_as_written_and_sorted(folder: Folder, tmp_path: Path) -> None:
+def test_rows_are_read_as_written_and_sorted(folder: Folder) -> None:
     folder.add(rows(1))
     folder.add(rows(0))
-    assert list(Folder(tmp_path / "c").rows()) == rows(1) + rows(0)
+    assert list(Folder(folder.path).rows()) == rows(1) + rows(0)
     folder.sort()
     assert list(folder.rows()) == rows(0) + rows(1)
 
 
 @pytest.mark.parametrize("cut", range(1, 200, 13))
-def test_repair_removes_only_a_torn_block(folder: Folder, tmp_path: Path, cut: int) -> None:
+def test_repair_removes_only_a_torn_block(folder: Folder, cut: int) -> None:
     folder.add(rows(2))
     folder.add(rows(1))
-    path = tmp_path / "c" / ROWS
+    path = folder.path / ROWS
     path.write_bytes(path.read_bytes()[:-cut])
     assert folder.repair(dict.fromkeys(range(6), 3)) == {2}
     assert list(folder.rows()) == rows(2)
@@ -51,12 +51,11 @@ def test_resume_needs_the_same_plan(tmp_path: Path, plan: CampaignPlan) -> None:
         Folder.begun(tmp_path / "c", other, resume=True)
 
 
-def test_resume_rejects_another_version(tmp_path: Path, plan: CampaignPlan) -> None:
-    Folder.begun(tmp_path / "c", plan, resume=False)
-    path = tmp_path / "c" / PLAN
+def test_resume_rejects_another_version(folder: Folder) -> None:
+    path = folder.path / PLAN
     path.write_text(json.dumps(json.loads(path.read_text()) | {"version": "0.0.1"}))
     with pytest.raises(FolderError, match=r"begun by cubestack 0\.0\.1, and this is"):
-        Folder.begun(tmp_path / "c", plan, resume=True)
+        Folder.begun(folder.path, folder.plan, resume=True)
 
 
 @pytest.mark.parametrize(
@@ -80,11 +79,11 @@ def test_rejects_a_folder_with_other_files(tmp_path: Path, plan: CampaignPlan) -
         Folder.begun(tmp_path, plan, resume=True)
 
 
-def test_campaign_is_locked_by_one_process(folder: Folder, tmp_path: Path) -> None:
+def test_campaign_is_locked_by_one_process(folder: Folder) -> None:
     with (
         folder.alone(),
         pytest.raises(FolderError, match="another process works on this campaign"),
-        Folder(tmp_path / "c").alone(),
+        Folder(folder.path).alone(),
     ):
         pass
 
@@ -109,9 +108,8 @@ def test_each_value_has_a_column(folder: Folder, failing: set[float]) -> None:
     assert [(one["block"], one["row"], one["outcome"], one["reason"]) for one in found] == [
         (row.block, row.row, row.outcome, row.reason) for row in folder.rows()
     ]
-    assert [one["result.drawn"] for one in found] == [
-        row.result.get("drawn") for row in folder.rows()
-    ]
+    drawn = [row.result.get("drawn") for row in folder.rows()]
+    assert [one["result.drawn"] for one in found] == drawn
     assert {one["swept.false_stars"] for one in found} == {0, 9}
 
 

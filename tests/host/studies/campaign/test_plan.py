@@ -57,13 +57,11 @@ def test_all_points_have_the_same_skies(tmp_path: Path) -> None:
 
 
 def test_seed_defaults_to_0() -> None:
-    untold, zero, one = (
-        [
-            block.seed
-            for block in CampaignPlan(device="cubestar", frames=3, block=1, **seed).blocks()
-        ]
+    plans = [
+        CampaignPlan(device="cubestar", frames=3, block=1, **seed)
         for seed in ({}, {"seed": 0}, {"seed": 1})
-    )
+    ]
+    untold, zero, one = ([block.seed for block in plan.blocks()] for plan in plans)
     assert untold == zero != one
 
 

@@ -16,14 +16,13 @@ from cubestack.host.studies.campaign.plan import CampaignPlan, FrameBlock
 from cubestack.host.studies.campaign.statistics import rates
 
 from ..test_workers import dask_cluster
-
-TEXT = 'device = "cubestar"\nframes = 2\nseed = 4\nblock = 1\n[grid]\nfalse_stars = [0, 10]\n'
+from .test_plan import PLAN_TEXT
 
 
 @pytest.fixture(scope="module")
 def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("plan") / "small.toml"
-    path.write_text(TEXT, "utf-8")
+    path.write_text(PLAN_TEXT, "utf-8")
     return path
 
 
@@ -120,24 +119,22 @@ def test_no_rows_are_written_if_every_frame_fails(folder: Folder, failing: set[f
 
 @pytest.mark.usefixtures("failing")
 def test_rows_are_sorted_whichever_worker_ends_first(
-    plan: CampaignPlan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    folder: Folder, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def performed_backwards(perform: Any, jobs: Any, *_workers: object) -> Iterator[Any]:
         yield from ((job, perform(job)) for job in reversed(jobs))
 
     def lines(folder: Folder) -> list[str]:  # wall times differ
-        return [
-            line.partition('"wall_ms"')[0] for line in content(folder.path).decode().splitlines()
-        ]
+        text = content(folder.path).decode()
+        return [line.partition('"wall_ms"')[0] for line in text.splitlines()]
 
-    usual = Folder.begun(tmp_path / "usual", plan, resume=False)
-    list(run(usual, 1))
+    list(run(folder, 1))
     monkeypatch.setattr(running, "performed", performed_backwards)
-    other = Folder.begun(tmp_path / "other", plan, resume=False)
+    other = Folder.begun(tmp_path / "other", folder.plan, resume=False)
     completed = [row.key for row in run(other, 1)]
     keys = [row.key for row in other.rows()]
     assert completed != keys == sorted(completed)
-    assert lines(other) == lines(usual)
+    assert lines(other) == lines(folder)
     assert [row.key for row in run(other, 1)] == keys
 
 
@@ -145,8 +142,8 @@ def of(frames: int, device: str = "cubestar") -> FrameBlock:
     return FrameBlock(4, device, {"false_stars": 2}, {"false_stars": 2}, frames, 77)
 
 
-def test_rows_have_the_outcome_of_each_frame(failing: set[float]) -> None:
-    assert not failing
+@pytest.mark.usefixtures("failing")
+def test_rows_have_the_outcome_of_each_frame() -> None:
     rows = perform(of(40))
     assert [row.key for row in rows] == [(4, number) for number in range(40)]
     for row in rows:
@@ -156,8 +153,8 @@ def test_rows_have_the_outcome_of_each_frame(failing: set[float]) -> None:
     assert len({row.outcome for row in rows}) == 3
 
 
-def test_rows_contain_no_durations(failing: set[float]) -> None:
-    assert not failing
+@pytest.mark.usefixtures("failing")
+def test_rows_contain_no_durations() -> None:
     assert perform(of(5)) == perform(of(5))
 
 
@@ -171,12 +168,9 @@ def test_failed_frame_is_a_row_and_others_are_measured(failing: set[float]) -> N
     assert all(row.result["drawn"] <= 0.8 for row in rows if row.outcome != "failed")
     # Its seed and its place give the same again.
     for row in rows:
-        again = list(blocks._measured(of(40), _results(row.seed), 0, row.seed, 1))[row.after]
+        results = blocks.measure("cubestar", frames=40, seed=row.seed, false_stars=2)
+        again = list(blocks._measured(of(40), results, 0, row.seed, 1))[row.after]
         assert (again.outcome, again.reason, again.result) == (row.outcome, row.reason, row.result)
-
-
-def _results(seed: int):  # type: ignore[no-untyped-def]
-    return blocks.measure("cubestar", frames=40, seed=seed, false_stars=2)
 
 
 def test_frame_of_two_cameras_has_two_rows() -> None:
@@ -186,9 +180,7 @@ def test_frame_of_two_cameras_has_two_rows() -> None:
 
 @pytest.mark.parametrize("profile", ["published", "extended"])
 def test_block_of_a_real_device(profile: str) -> None:
-    (one,) = CampaignPlan(
-        device="cubestar", frames=2, seed=3, options={"profile": profile}
-    ).blocks()
-    rows = perform(one)
+    plan = CampaignPlan(device="cubestar", frames=2, seed=3, options={"profile": profile})
+    rows = perform(*plan.blocks())
     assert [row.outcome for row in rows] == ["right", "right"]
     assert "wall_ms" not in rows[0].result

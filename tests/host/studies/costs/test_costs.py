@@ -152,9 +152,6 @@ def test_rejects_devices_without_compiled_costs(
     assert "no device has a program to compile" in found.line
 
 
-COMPILER = "arm-none-eabi-gcc"
-
-
 def test_missing_compiler_names_the_package(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     from cubestack.emulator.boards.cubestar.compiled import build
 

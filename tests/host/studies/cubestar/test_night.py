@@ -1,19 +1,24 @@
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from cubestack.emulator.iss.insight.reports import MemoryUse
+from cubestack.emulator.native.compiler import find_compiler
+from cubestack.emulator.scene.attitude import matrix_from_quaternion, pointing_from_matrix
 from cubestack.firmware_model.interface.cubestar import MatchMode, TaskStatus
 from cubestack.firmware_model.interface.cubestar.pins import Layout
 from cubestack.host.experiments.cubestar import measure
-from cubestack.host.studies.cubestar import layouts
+from cubestack.host.studies.cubestar import layouts, memory
 from cubestack.host.studies.cubestar import night as module
 from cubestack.host.studies.cubestar.layouts import Found, LayoutOptions, LayoutResult
 from cubestack.host.studies.cubestar.night import INTERVAL_S, SETTLING, night
 from cubestack.host.studies.cubestar.shots import _shot
+from cubestack.host.studies.fidelity.table import Job, perform
 
 #: Of each field: sigma of right ascension, declination and roll, deg; part that is valid.
 CALM, SHAKEN, BLIND = (0.01, 0.02, 0.05, 1.0), (0.01, 2.0, 0.05, 1.0), (0.01, 0.01, 0.01, 0.4)
@@ -76,8 +81,6 @@ def test_fields_are_at_the_zenith_during_a_sidereal_day(asked: list[Any]) -> Non
     assert len(scenes) == len(asked_for) == 8
     assert {(one.count, one.interval_s) for one in asked_for} == {(10 + SETTLING, INTERVAL_S)}
     assert asked.count("Trigger") == 8
-    from cubestack.emulator.scene.attitude import matrix_from_quaternion, pointing_from_matrix
-
     for number, scene in enumerate(scenes):
         ra, dec, _ = pointing_from_matrix(matrix_from_quaternion(scene.quaternion))
         assert (ra % 360, dec) == pytest.approx((45.0 * number, -33.93), abs=1e-6)
@@ -116,12 +119,8 @@ def test_no_usable_field_gives_no_figures(
         assert night(opener(asked), 1) == {}
 
 
+@pytest.mark.skipif(find_compiler() is None, reason="needs the compiled FPGA")
 def test_night_end_to_end() -> None:
-    from cubestack.emulator.native.compiler import find_compiler
-    from cubestack.host.studies.fidelity.table import Job, perform
-
-    if find_compiler() is None:
-        pytest.skip("needs the compiled FPGA")
     found = perform(Job("cubestar", "night", "extended", 1, 1.0))
     assert (found["valid"], found["fields"]) == (100, 1)
     assert 8 <= found["fewest"] <= found["most"] <= 16
@@ -197,3 +196,38 @@ def test_one_attitude_has_no_rate(monkeypatch: pytest.MonkeyPatch) -> None:
     result = measured(monkeypatch, [Found(10**12, 5.0, 300.0, right=None)])
     assert (result.attitudes, result.right, result.rate_hz) == (0, None, None)
     assert result.age_ms is result.oldest_ms is result.power_mw is result.energy_mj is None
+
+
+USE = MemoryUse(
+    **{"flash": 262_144, "flash_size": 1 << 20, "ram_size": 1 << 17, "static": 1 << 15},
+    **{"heap": 1 << 10, "stack": None, "process_stack": 0x2000_1F00, "free": 96},
+)
+
+
+@pytest.mark.parametrize("capture", [False, True])
+def test_memory_is_reported_after_a_run(monkeypatch: pytest.MonkeyPatch, capture: bool) -> None:
+    done = list[object]()
+    client = SimpleNamespace(capture_and_process=lambda: done.append("capture"))
+
+    @contextmanager
+    def opened(_scene: object, *, seed: int) -> Iterator[Any]:
+        yield SimpleNamespace(client=client, wait=done.append)
+        done.append("closed")
+
+    monkeypatch.setattr(memory, "own_firmware", lambda *_words: SimpleNamespace(observer=None))
+    monkeypatch.setattr(memory, "memory_use", lambda _observer: USE)
+    options = memory.MemoryOptions(seconds=1.5, capture=capture)
+    (facts,) = memory.EXPERIMENT.run(opened, options)
+    assert done == [1.5, *["capture"] * capture, "closed"]
+    assert facts.as_dict()["heap"] == 1024
+    lines = list(memory._lines(USE))
+    assert [line.split() for line in lines] == [
+        ["flash", "262144", "bytes,", "25.0", "%"],
+        ["static", "RAM", "32768", "bytes,", "25.0", "%"],
+        ["heap", "1024", "bytes,", "0.8", "%"],
+        ["stack", "not", "known:", "the", "program", "has", "no", "symbols", "for", "it"],
+        ["process", "stack", "down", "to", "20001f00"],
+        ["never", "touched", "96", "bytes,", "0.1", "%"],
+    ]
+    assert len({line.index(" bytes") for line in lines if " bytes" in line}) == 1  # aligned
+    assert len(list(memory._lines(replace(USE, process_stack=None)))) == 5

@@ -1,7 +1,5 @@
 import re
-from collections.abc import Iterator
 from itertools import combinations
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -18,9 +16,10 @@ from cubestack.host.studies.cubesense.fidelity import _lens
 from cubestack.host.studies.cubestar import fidelity as cubestar
 from cubestack.host.studies.cubestar.shots import Shot
 from cubestack.host.studies.fidelity import table as fidelity
-from cubestack.host.studies.fidelity.table import Job, Row, fidelity_of, perform
+from cubestack.host.studies.fidelity.table import Job, fidelity_of, perform
 
-DOCS = Path(__file__).parents[4] / "docs"
+from .test_table import page_rows
+
 LONG = {"calibration"}
 CHEAP = [
     (device, name)
@@ -28,17 +27,6 @@ CHEAP = [
     for name, trial in fidelity_of(device).trials.items()
     if (not trial.profiles or name == "tiles") and name not in LONG
 ]
-
-
-def measured_cells(device: str) -> Iterator[tuple[Row, list[str]]]:
-    """Rows, and the cells of both profiles on the page."""
-    wanted = fidelity_of(device)
-    page = (DOCS / wanted.page).read_text(encoding="utf-8")
-    for table, rows in wanted.tables.items():
-        begin, end = fidelity.marks(table)
-        lines = page.split(begin)[1].split(end)[0].strip().splitlines()[2:]
-        for row, line in zip(rows, lines, strict=True):
-            yield row, line.removeprefix("| ").removesuffix(" |").split(" | ")[3:5]
 
 
 @pytest.mark.skipif(find_compiler() is None, reason="the whole stack needs the compiled FPGA")
@@ -49,10 +37,10 @@ def test_figure_matches_the_page(device: str, name: str) -> None:
         perform(Job(device, name, profile, trial.frames, 1.0))
         for profile in (("published", "extended") if trial.profiles else ("published",))
     ]
-    rows = [(row, cells) for row, cells in measured_cells(device) if row.trial == name]
+    rows = [(row, cells) for row, cells in page_rows(device) if row.trial == name]
     assert rows
     for row, cells in rows:
-        for figures, cell in zip([*found, found[-1]], cells, strict=False):
+        for figures, cell in zip([*found, found[-1]], cells[3:5], strict=False):
             assert fidelity.shown(row, figures) == cell, row.key
 
 
@@ -273,6 +261,15 @@ def test_slow_slew_is_tracked_and_fast_slew_is_lost() -> None:
     assert slow["cross"] < 0.01
     fast = perform(Job("cubestar", "slew-8.0", "extended", 1, 1.0))
     assert fast["right"] == fast["off"] == 0
+
+
+@compiled
+def test_ball_is_seen_where_the_stage_moved_it() -> None:
+    found = perform(Job("cubesense", "ball", "published", 1, 1.0))
+    for direction in ("right", "left", "down", "up"):
+        assert 0 < found[direction] < 0.5
+    assert 0 <= found["sigma"] < 0.3
+    assert np.isfinite(list(found.values())).all()
 
 
 def test_discriminant_matches_the_roots_of_the_polynomial() -> None:

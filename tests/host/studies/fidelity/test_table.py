@@ -1,6 +1,7 @@
 """Published figures: what devices declare, the command that measures ours, and the pages."""
 
 import json
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -162,19 +163,24 @@ def test_write_rejects_a_page_without_markers_before_measuring(
         assert "has no <!-- rows: pace -->" in refused.line
 
 
-@pytest.mark.parametrize("name", BUILT_IN)
-def test_page_rows_match_the_declared_rows(name: str) -> None:
+def page_rows(name: str) -> Iterator[tuple[Row, list[str]]]:
+    """Rows of a device, and their cells on the page."""
     wanted = fidelity_of(name)
     page = (ROOT / "docs" / wanted.page).read_text(encoding="utf-8")
     for table, rows in wanted.tables.items():
         begin, end = fidelity.marks(table)
         lines = page.split(begin)[1].split(end)[0].strip().splitlines()[2:]
-        cells = [line.removeprefix("| ").removesuffix(" |").split(" | ") for line in lines]
-        assert [(*one[:3], *one[5:]) for one in cells] == [
-            (row.figure, row.source, row.published, row.word, f"`{wanted.command(name, row)}`")
-            for row in rows
-        ], table
-        assert all(one[3] and one[4] for one in cells), table
+        for row, line in zip(rows, lines, strict=True):
+            yield row, line.removeprefix("| ").removesuffix(" |").split(" | ")
+
+
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_page_rows_match_the_declared_rows(name: str) -> None:
+    for row, cells in page_rows(name):
+        command = f"`{fidelity_of(name).command(name, row)}`"
+        expected = [row.figure, row.source, row.published, row.word, command]
+        assert cells[:3] + cells[5:] == expected
+        assert all(cells[3:5]), row.key
 
 
 def test_remaining_time_scales_with_the_time_so_far(
