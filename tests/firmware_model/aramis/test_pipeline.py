@@ -136,3 +136,51 @@ def test_phases_and_time_of_a_picture_that_is_not_changed() -> None:
     solve(image, VERIFIED, spent)
     assert {"threshold", "spikes", "centroids", "search", "attitude"} <= set(spent.phases)
     assert 0.02 < spent.table.seconds(spent.total) < 2
+
+
+# --- the cause of a bad picture, by its traces -------------------------------------------------
+
+Y, X = np.mgrid[: FIELD.rows, : FIELD.columns]
+
+
+def noisy(level: object) -> NDArray[np.uint8]:
+    image = np.random.default_rng(0).normal(0, 1.5, Y.shape) + level
+    return np.clip(np.rint(image), 0, 255).astype(np.uint8)
+
+
+def reason(image: NDArray[np.uint8], configuration: Configuration = VERIFIED) -> Reason:
+    solution = solve(image, configuration)
+    assert solution.outcome is MeasurementOutcome.NONE
+    return solution.reason
+
+
+def hit(count: int) -> NDArray[np.uint8]:
+    image = noisy(6.0)
+    image.ravel()[np.random.default_rng(1).choice(image.size, count, replace=False)] = 255
+    return image
+
+
+@pytest.mark.parametrize(
+    ("image", "expected"),
+    [
+        (noisy(6.0), Reason.TOO_FEW_STARS),
+        (noisy(60.0), Reason.STRAY_LIGHT),
+        (noisy(6 + 0.03 * X), Reason.STRAY_LIGHT),
+        (noisy(6 + 300.0 * (Y < 300)), Reason.SATURATED),
+        (noisy(6 + 300.0 * (np.hypot(X - 640, Y - 500) < 60)), Reason.SATURATED),
+        (hit(2000), Reason.RADIATION),
+    ],
+    ids=["dark", "bright", "gradient", "limb", "disc", "hits"],
+)
+def test_the_reason_is_true(image: NDArray[np.uint8], expected: Reason) -> None:
+    assert reason(image) is expected
+
+
+def test_a_picture_full_of_hits_is_not_even_tried() -> None:
+    spent = meter()
+    assert solve(hit(60_000), spent=spent).reason is Reason.RADIATION
+    assert "triangles" not in spent.phases
+
+
+def test_as_published_there_are_no_such_reasons() -> None:
+    assert reason(hit(2000), PUBLISHED) is Reason.TOO_FEW_STARS

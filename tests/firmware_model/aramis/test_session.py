@@ -9,8 +9,10 @@ from cubestack.firmware_model.aramis.catalogue.flash_store import flash_image
 from cubestack.firmware_model.aramis.hardware import FrameEnd
 from cubestack.firmware_model.aramis.link import AramisLink
 from cubestack.firmware_model.aramis.program import AramisProgram
+from cubestack.firmware_model.interface.aramis import INTERFACE
 from cubestack.firmware_model.interface.aramis.switches import AramisSwitches
 from cubestack.firmware_model.mcu.requests import Routine
+from cubestack.firmware_model.node.commands import QueuedCommand
 
 from ..sessions import Step, as_recorded
 from .harness import Harness
@@ -131,3 +133,15 @@ def test_what_needs_an_active_sensor_says_so(name: str) -> None:
     assert (unit.telemetry("CatalogueStatus"), unit.telemetry("LoopStatus")) == before
     unit.command("Activate", "ClearErrorFlags", name)
     assert not unit.telemetry("ErrorFlags")["NotActive"]
+
+
+@pytest.mark.parametrize("name", ["WriteCameraRegister", "SelectCameraRegister"])
+def test_a_register_of_a_camera_that_does_not_answer(name: str) -> None:
+    unit = Harness()
+    program = AramisProgram(unit, unit.meter)
+    command = QueuedCommand(INTERFACE.telecommand(name), {"Address": 9, "Value": 5})
+    unit.perform(program.commands.execute(command))
+    assert not program.state.flags
+    unit.registers = None
+    unit.perform(program.commands.execute(command))
+    assert program.state.flags == {"CameraSilent"}

@@ -7,41 +7,38 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cubestack.firmware_model.formats import recording
+from cubestack.firmware_model.formats.setup import Document, Setup
 
 TIMES = st.integers(0, 10**15)
-LINES = st.builds(
-    recording.LineBytes,
-    TIMES,
-    st.just("uart"),
-    st.sampled_from(["host", "device"]),
-    st.binary(min_size=1, max_size=9),
-    st.integers(1, 10**9),
-)
-MESSAGES = st.builds(
-    recording.BusMessage, st.integers(0, 127), st.binary(max_size=5), st.booleans()
-)
-TRANSFERS = st.builds(
-    recording.BusTransfer,
-    TIMES,
-    st.just("i2c"),
-    TIMES,
-    st.lists(MESSAGES, max_size=3).map(tuple),
-    st.integers(0, 130),
-)
-EVENTS = LINES | TRANSFERS | st.builds(recording.LineError, TIMES, st.just("uart"))
+UART, I2C = st.just("uart"), st.just("i2c")
+ENDS, DATA = st.sampled_from(["host", "device"]), st.binary(min_size=1, max_size=9)
+LINES = st.builds(recording.LineBytes, TIMES, UART, ENDS, DATA, st.integers(1, 10**9))
+WORDS = st.builds(recording.BusMessage, st.integers(0, 127), st.binary(max_size=5), st.booleans())
+MESSAGES = st.lists(WORDS, max_size=3).map(tuple)
+TRANSFERS = st.builds(recording.BusTransfer, TIMES, I2C, TIMES, MESSAGES, st.integers(0, 130))
+EVENTS = LINES | TRANSFERS | st.builds(recording.LineError, TIMES, UART)
+TEXTS = st.text(max_size=30)
+DOCUMENTS = st.none() | st.builds(Document, TEXTS, TEXTS)
+OPTIONS = st.dictionaries(TEXTS, st.booleans() | st.integers() | TEXTS, max_size=3)
+SETUPS = st.builds(Setup, TEXTS, st.just(""), st.integers(0, 2**40), DOCUMENTS, DOCUMENTS, OPTIONS)
 
 
-@given(st.lists(EVENTS, max_size=8))
-def test_what_is_written_is_read(tmp_path_factory, events):
+@given(st.lists(EVENTS, max_size=8), st.none() | SETUPS)
+def test_what_is_written_is_read(tmp_path_factory, events, setup):
     stream = io.StringIO()
-    writer = recording.RecordingWriter(stream, "cubestar", {"uart": 57_600})
+    writer = recording.RecordingWriter(stream, "cubestar", {"uart": 57_600}, setup)
     for event in events:
         writer.write(event)
     path = tmp_path_factory.getbasetemp() / "some.rec"
-    path.write_text(stream.getvalue())
+    path.write_text(stream.getvalue(), encoding="utf-8")
     found = recording.load_recording(path)
     assert (found.device, found.bauds) == ("cubestar", {"uart": 57_600})
+    assert found.setup == setup
     assert list(found.events) == sorted(events, key=lambda event: event.time_ps)
+
+
+HEADER = '{"recording": 1, "device": "x", "lines": {}}\n'
+EVENT = '{"ps": 1, "port": "uart", "from": "%s", "data": "%s", "byte_ps": 1}'
 
 
 @pytest.mark.parametrize(
@@ -52,17 +49,9 @@ def test_what_is_written_is_read(tmp_path_factory, events):
         ('{"recording": 2}', "line 1: there is no header"),
         ('{"recording": 1}', "line 1: lacks 'lines'"),
         ("[]", "line 1: there is no header"),
-        ('{"recording": 1, "device": "x", "lines": {}}\n{"ps": 1}', "line 2: lacks 'port'"),
-        (
-            '{"recording": 1, "device": "x", "lines": {}}\n'
-            '{"ps": 1, "port": "uart", "from": "me", "data": "", "byte_ps": 1}',
-            'line 2: "from" must be',
-        ),
-        (
-            '{"recording": 1, "device": "x", "lines": {}}\n'
-            '{"ps": 1, "port": "uart", "from": "host", "data": "xy", "byte_ps": 1}',
-            "line 2: non-hexadecimal",
-        ),
+        (HEADER + '{"ps": 1}', "line 2: lacks 'port'"),
+        (HEADER + EVENT % ("me", ""), 'line 2: "from" must be'),
+        (HEADER + EVENT % ("host", "xy"), "line 2: non-hexadecimal"),
         ("\x00\xff\n" * 3, "line 1: "),
     ],
 )
@@ -78,8 +67,28 @@ def test_rejects_files_that_are_not_recordings(tmp_path, text, reason):
 def test_a_part_ends_with_what_begins_at_its_end():
     begun = [recording.LineError(time_ps, "uart") for time_ps in (5, 10, 11)]
     whole = recording.Recording("a", "cubestar", events=tuple(begun))
-    assert [whole.until(end_ps).events for end_ps in (4, 10, 11)] == [
-        (),
-        tuple(begun[:2]),
-        tuple(begun),
-    ]
+    for end_ps, count in ((4, 0), (10, 2), (11, 3)):
+        assert whole.until(end_ps).events == tuple(begun[:count])
+
+
+def test_recording_of_a_real_device_has_no_setup():
+    setup = Setup("1.0", target="/dev/ttyUSB0", seed=3)
+    assert setup.to_json() == {"version": "1.0", "target": "/dev/ttyUSB0"}
+    assert Setup.from_json(setup.to_json()) == Setup("1.0", target="/dev/ttyUSB0")
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        ([], '"setup" must be an object'),
+        ({"sede": 1}, "no member 'sede'"),
+        ({"seed": -1}, "whole number from 0, not -1"),
+        ({"seed": True}, "whole number from 0, not True"),
+        ({"scene": "sky.toml"}, '"scene" must be an object'),
+        ({"faults": {"text": 1}}, '"text" must be a text, not 1'),
+        ({"options": {"x": []}}, '"options" must be an object'),
+    ],
+)
+def test_rejects_inconsistent_setups(content, reason):
+    with pytest.raises(ValueError, match=reason):
+        Setup.from_json(content)

@@ -7,6 +7,7 @@ from cubestack.firmware_model.mcu import pic18
 from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533, CORE_HZ, blackfin_bf533
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3, cortex_m3
 from cubestack.firmware_model.mcu.costs import Cost, CostError, CostTable, Meter
+from cubestack.firmware_model.mcu.memory import FlashStore
 
 from ..operations import as_on_record
 
@@ -180,3 +181,18 @@ def test_costs_have_the_order_common_to_all_libraries() -> None:
 def test_the_instruction_clock_is_that_of_the_published_timer_formula() -> None:
     # 4 tenths of the timer's period at the prescaler of 256, CubeSense thesis, equation 7.4.1
     assert pic18.PIC18F45K20.seconds(256 * 1000) == pytest.approx(1000 * 256 / 5e6)
+
+
+def test_pages_keep_what_was_written_last_and_their_writes_are_counted() -> None:
+    flash = FlashStore()
+    data = bytearray(b"12")
+    for page, contents in (("a", b"0"), ("b", b"2"), ("a", data)):
+        flash.write(page, contents)
+    data[0] = 0  # the page has a copy
+    assert [flash.read(page) for page in "abc"] == [b"12", b"2", None]
+    flash.erase("a")
+    flash.erase("never written")
+    assert [flash.read(page) for page in "abc"] == [None, b"2", None]
+    flash.write("a", b"3")
+    assert flash.read("a") == b"3"
+    assert flash.writes == {"a": 3, "b": 1}

@@ -1,12 +1,23 @@
-"""Centroids of regions against sums over each region."""
+"""Regions against sums over each, and spikes, both ways, against counting window by window."""
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from cubestack.firmware_model.aramis.detection.charges import charge_spikes
+from cubestack.firmware_model.aramis.detection.mask import (
+    FRAMES,
+    HALF,
+    LevelHistory,
+    SpikeRemoval,
+    remove_spikes,
+)
 from cubestack.firmware_model.aramis.detection.regions import MOST_RUNS, find_regions, locate_stars
+from cubestack.firmware_model.aramis.field import CameraField
 from cubestack.firmware_model.aramis.solution import StarList
+
+from ..sky import meter
 
 TOUCHING = np.ones((3, 3))
 
@@ -68,3 +79,123 @@ def test_gives_up_on_too_many_runs() -> None:
     chequered = (np.indices((256, 256)).sum(axis=0) % 2).astype(bool)
     assert chequered.sum() > MOST_RUNS
     assert find_regions(chequered) is None
+
+
+FLAT = CameraField(columns=64, rows=48, round=False)
+ROUND = CameraField(columns=64, rows=48)
+
+
+def noise(level: float, sigma: float, seed: int) -> np.ndarray:
+    values = np.random.default_rng(seed).normal(level, sigma, (48, 64))
+    return np.clip(np.rint(values), 0, 255).astype(np.uint8)
+
+
+def after(*pictures: np.ndarray, field: CameraField = FLAT) -> LevelHistory:
+    background = LevelHistory()
+    for picture in pictures:
+        background.add(picture, field, meter())
+    return background
+
+
+def test_mean_plus_two_sigma_of_all_pixels() -> None:
+    pictures = [noise(20, 3, seed) for seed in range(FRAMES)]
+    background = after(*pictures)
+    pixels = np.stack(pictures)
+    assert background.mean(meter()) == round(pixels.mean())
+    assert background.threshold(2, meter()) == int(pixels.mean() + 2 * pixels.std())
+    assert background.threshold(0, meter()) == int(pixels.mean())
+
+
+def test_only_the_last_five_count() -> None:
+    levels = (200, 200, 10, 10, 10, 10, 10)
+    background = after(*(np.full((48, 64), level, dtype=np.uint8) for level in levels))
+    assert len(background.sums) == FRAMES
+    assert background.mean(meter()) == background.threshold(2, meter()) == 10
+
+
+def test_background_works_with_fewer_images() -> None:
+    assert LevelHistory().mean(meter()) == LevelHistory().threshold(2, meter()) == 0
+    assert after(noise(50, 5, 1)).threshold(2, meter()) == pytest.approx(60, abs=1)
+
+
+def test_a_change_of_level_is_followed_slowly() -> None:
+    assert after(*[noise(20, 2, 1)] * 4, noise(40, 2, 2)).mean(meter()) == 24
+
+
+def test_what_is_outside_the_field_does_not_count() -> None:
+    background = after(np.where(ROUND.mask, 30, 255).astype(np.uint8), field=ROUND)
+    assert background.mean(meter()) == background.threshold(5, meter()) == 30
+
+
+def test_the_largest_sums() -> None:
+    """All white at full size: the squares of five pictures exceed 32 bits."""
+    white = np.full((1024, 1280), 255, dtype=np.uint8)
+    background = after(*[white] * FRAMES, field=CameraField(round=False))
+    assert background.sums[0][2] < 2**39
+    assert background.threshold(2, meter()) == 255
+
+
+Mask = NDArray[np.bool_]
+SHAPES = [(20, 25), (21, 28), (24, 22), (5, 5), (3, 4), (1, 1)]
+
+
+def run(mask: Mask, method: SpikeRemoval, needed: int = HALF) -> Mask:
+    return remove_spikes(mask, method, needed)[0]
+
+
+def slowly(mask: Mask, method: SpikeRemoval, needed: int) -> Mask:
+    """As section 3.5 says it, one window after the other."""
+    rows, columns = mask.shape
+    result = np.zeros_like(mask)
+    if method is SpikeRemoval.CENTRE:
+        for y in range(rows):
+            for x in range(columns):
+                window = mask[max(0, y - 2) : y + 3, max(0, x - 2) : x + 3]
+                result[y, x] = 25 * window.sum() >= needed * window.size
+        return result
+    for y in range(0, rows, 5):
+        for x in range(0, columns, 5):
+            window = mask[y : y + 5, x : x + 5]
+            if 25 * window.sum() >= needed * window.size:
+                result[y : y + 5, x : x + 5] = window
+    return result
+
+
+@pytest.mark.parametrize("method", [SpikeRemoval.CENTRE, SpikeRemoval.WINDOW])
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("needed", [1, 8, HALF, 25])
+def test_each_window_by_itself(method: SpikeRemoval, shape: tuple[int, int], needed: int) -> None:
+    for seed in range(5):
+        mask = np.random.default_rng(seed).random(shape) < 0.5
+        np.testing.assert_array_equal(run(mask, method, needed), slowly(mask, method, needed))
+
+
+@pytest.mark.parametrize("method", [SpikeRemoval.CENTRE, SpikeRemoval.WINDOW])
+def test_spikes_go_and_stars_stay(method: SpikeRemoval) -> None:
+    spikes = np.random.default_rng(1).random((100, 100)) < 0.05
+    assert not run(spikes, method).any()
+    star = np.zeros((100, 100), dtype=bool)
+    star[40:50, 40:50] = True
+    assert run(spikes | star, method)[40:50, 40:50].sum() > 90
+
+
+def test_a_window_of_thirteen_stays_and_one_of_twelve_goes() -> None:
+    mask = np.zeros((15, 15), dtype=bool)
+    mask[5:10, 5:10].flat[:13] = True
+    assert run(mask, SpikeRemoval.WINDOW).sum() == 13
+    mask[5, 5] = False
+    assert run(mask, SpikeRemoval.WINDOW).sum() == 0
+
+
+def test_filter_off_leaves_the_image_unchanged() -> None:
+    mask = np.random.default_rng(2).random((9, 9)) < 0.5
+    assert run(mask, SpikeRemoval.OFF) is mask
+
+
+def test_the_second_method_is_the_quicker_one() -> None:
+    first, second = meter(), meter()
+    charge_spikes((100, 100), SpikeRemoval.CENTRE, 0, first)
+    charge_spikes((100, 100), SpikeRemoval.WINDOW, 0, second)
+    looks = [spent.counts["table_byte"] for spent in (first, second)]
+    assert looks == [4 * 100**2, 100**2]
+    assert first.total > 4 * second.total

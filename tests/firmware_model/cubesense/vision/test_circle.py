@@ -1,9 +1,15 @@
+"""The circle, and the limb with its uncertainty, beside least squares of another library."""
+
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from cubestack.firmware_model.cubesense.vision.arithmetic import sequential_sum, to_int16
 from cubestack.firmware_model.cubesense.vision.circle import Circle, LeastSquaresCircle
+from cubestack.firmware_model.cubesense.vision.limb import Limb, Tolerances, find_limb
 from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.mcu.pic18 import PIC18F45K20
 
 
 def on_circle(rng: np.random.Generator, count: int, spread: float = 6.3) -> np.ndarray:
@@ -67,3 +73,113 @@ def test_residuals_are_distances_from_the_circle(meter: Meter) -> None:
     radius = 150 + outside
     points = np.stack([10 + radius * np.cos(turn), -20 + radius * np.sin(turn)], axis=1)
     assert circle.residuals(points.astype(np.float32), meter) == pytest.approx(outside, abs=0.02)
+
+
+ALLOWED = Tolerances(on_px=4.0, good_rms_px=1.0, usual_px=0.3)
+TANGENTS = (0.5, 5.0, 166.0)
+TRUE = (10.0, -20.0, 120.0)
+
+Points = NDArray[np.float64]
+
+
+def circle(count: int, noise_px: float = 0.0, arc_deg: float = 360.0) -> Points:
+    rng = np.random.default_rng(count)
+    turn = np.radians(np.linspace(20, 20 + arc_deg, count, endpoint=False))
+    radius = TRUE[2] + noise_px * rng.standard_normal(count)
+    return np.array(TRUE[:2]) + radius[:, None] * np.column_stack([np.cos(turn), np.sin(turn)])
+
+
+def found(points: Points, moved: int = 0, allowed: Tolerances = ALLOWED) -> Limb:
+    """The limb among points, of which the last ``moved`` are far off."""
+    points = points.copy()
+    points[len(points) - moved :] += np.array([[30, 5], [-40, 20], [10, -50]])[:moved]
+    inwards = np.sign(np.array(TRUE[:2]) - points)
+    sides = np.where(np.arange(2) == (np.arange(len(points)) % 2)[:, None], inwards, 0)
+    limb = find_limb(
+        points.astype(np.float32), sides.astype(np.int8), allowed, TANGENTS, Meter(PIC18F45K20)
+    )
+    assert limb is not None
+    return limb
+
+
+def jacobian(points: Points) -> tuple[Points, Points]:
+    """Of the best circle's distances, and the circle."""
+
+    def distances(x: Points) -> Points:
+        return np.asarray(np.hypot(*(points - x[:2]).T) - x[2])
+
+    best = least_squares(distances, TRUE)
+    return np.asarray(best.jac), np.asarray(best.x)
+
+
+@pytest.mark.parametrize("arc_deg", [360.0, 150.0])
+@pytest.mark.parametrize("count", [5, 12, 28])
+def test_it_is_the_circle_of_least_squares(count: int, arc_deg: float) -> None:
+    points = circle(count, 0.3, arc_deg)
+    limb = found(points)
+    _, best = jacobian(points)
+    assert [limb.circle.x, limb.circle.y, limb.circle.radius] == pytest.approx(best, abs=0.05)
+    assert limb.on_circle == count
+
+
+@pytest.mark.parametrize(
+    ("count", "variance"),
+    [
+        # 6 usual edges and those above 3 without a residual; few of them hide a false one.
+        (4, 6 / 7 * (1 + 8 / 1)),
+        (5, 6 / 8 * (1 + 10 / 4)),
+        (7, 6 / 10 * (1 + 14 / 16)),
+        (20, 6 / 23 * (1 + 40 / 289)),
+    ],
+)
+def test_the_usual_variance_and_few_edges(count: int, variance: float) -> None:
+    points = circle(count)
+    limb = found(points)
+    jac, _ = jacobian(points)
+    expected = variance * ALLOWED.usual_px**2 * np.linalg.inv(jac.T @ jac)
+    assert limb.covariance == pytest.approx(expected, rel=0.01, abs=1e-5)
+    assert limb.rms_px < 0.01
+
+
+def test_edges_left_out_and_residuals_make_it_less_sure() -> None:
+    whole, parts = (found(circle(20), moved) for moved in (0, 3))
+    assert parts.on.tolist() == [True] * 17 + [False] * 3
+    rest = found(circle(20)[:17])
+    assert parts.covariance == pytest.approx((20 / 17) ** 2 * rest.covariance, rel=0.01, abs=1e-5)
+    assert np.trace(parts.covariance) > np.trace(whole.covariance)
+    # Alternating 1 px in and out: 20 squares beside 6 of 0.09, by 23; what is beyond counts 4.
+    points = circle(20)
+    away = points - TRUE[:2]
+    points += away / TRUE[2] * np.where(np.arange(20) % 2, 1.0, -1.0)[:, None]
+    limb = found(points)
+    jac, _ = jacobian(points)
+    posterior = (6 * 0.09 + 20) / 23
+    expected = (0.09 + 4 * (posterior - 0.09)) * (1 + 40 / 289) * np.linalg.inv(jac.T @ jac)
+    assert limb.rms_px == pytest.approx(1.0, abs=0.01)
+    assert limb.covariance == pytest.approx(expected, rel=0.02, abs=1e-4)
+
+
+def test_residuals_are_those_after_the_last_step() -> None:
+    points = circle(28)
+    points[0] += 0.2 * (points[0] - TRUE[:2]) / TRUE[2]
+    limb = found(points, allowed=Tolerances(on_px=0.1, good_rms_px=1.0, usual_px=0.3))
+    assert limb.on.tolist() == [False] + [True] * 27  # one step brings the circle onto these
+    assert limb.rms_px < 0.001
+
+
+@pytest.mark.parametrize(
+    ("value", "cast"),
+    [(2.9, 2), (-2.9, -2), (32767.5, 32767), (32768.0, -32768), (-32769.0, 32767), (65536.0, 0)],
+)
+def test_a_cast_truncates_and_wraps(value: float, cast: int) -> None:
+    assert to_int16(np.float32(value)) == cast
+
+
+def test_a_sum_rounds_after_every_term() -> None:
+    terms = np.array([2**24, 1, 1, 1, 1], np.float32)
+    # Each 1 alone is lost beside 2^24; summed in pairs they would not be.
+    assert sequential_sum(terms) == 2**24
+
+
+def test_the_sum_of_nothing_is_nothing() -> None:
+    assert sequential_sum(np.zeros((0, 3), np.float32)).tolist() == [0, 0, 0]

@@ -12,6 +12,7 @@ from cubestack.firmware_model.interface.codec.field import (
     i16,
     u8,
 )
+from cubestack.firmware_model.interface.codec.letters import Letter, LetterProtocol
 from cubestack.firmware_model.interface.codec.register_pointer import PointerMap, PointerRegister
 
 _RW, _RO, _WO = (RegisterAccess.READ_WRITE, RegisterAccess.READ_ONLY, RegisterAccess.WRITE_ONLY)
@@ -74,3 +75,23 @@ def test_errors_name_the_offender(call: Callable[[], object], message: str) -> N
     with pytest.raises(InterfaceError) as caught:
         call()
     assert message in str(caught.value)
+
+
+TAKE = Letter("a", "TAKE", "", 1, b"Y")
+SEND = Letter("s", "SEND", "", 1000)
+
+
+def test_lookup_by_byte() -> None:
+    bench = LetterProtocol(115_200, (TAKE, SEND))
+    assert (bench.find(ord("a")), bench.find(0), TAKE.request) == (TAKE, None, b"a")
+
+
+def test_rejects_wrong_declarations() -> None:
+    for letter in ("", "ab", "é"):
+        with pytest.raises(ValueError, match="is not one ASCII character"):
+            Letter(letter, "X", "", 1)
+    with pytest.raises(ValueError, match="its answer has 1 bytes, not 2"):
+        Letter("x", "X", "", 2, b"Y")
+    for other in (Letter("a", "X", "", 1), Letter("x", "TAKE", "", 1)):
+        with pytest.raises(ValueError, match="must differ in both"):
+            LetterProtocol(9600, (TAKE, other))
