@@ -1,8 +1,13 @@
-"""The serial line: every byte at its time, both ways, and silence told once."""
+"""The serial line: every byte at its time, silence told once; formats against a stepper."""
+
+from fractions import Fraction
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
+
+from cubestack.emulator.bus.line_format import LineFormat, LineSampler
+from cubestack.emulator.sim.virtual_time import PS_PER_S
 
 from .ends import Desk
 
@@ -104,3 +109,163 @@ def test_nothing_heard_is_no_silence(desk, said):
     desk.uart.host_writes(b"")
     desk.kernel.advance_to(1000 * BYTE)
     assert (blocks, desk.silences) == (said, [])
+
+
+FORMATS = st.builds(
+    LineFormat,
+    baud=st.sampled_from([300, 9600, 57_600, 115_200, 1_000_000]),
+    data_bits=st.integers(5, 8),
+    parity=st.sampled_from(list("NEOMS")),
+    stop_bits=st.sampled_from([1, 1.5, 2]),
+)
+
+
+def heard(data: bytes, sender: LineFormat, receiver: LineFormat) -> list[tuple[int, bool, bool]]:
+    sampler = LineSampler(receiver)
+    for index, byte in enumerate(data):
+        sampler.put(byte, index * sender.character_ps, sender)
+    return [character[1:] for character in sampler.take(10**18)]
+
+
+def stepped(data: bytes, sender: LineFormat, receiver: LineFormat) -> list[int]:
+    """Oracle for 8N1: values with a good stop bit, found in steps of 1/16 of the faster bit."""
+    step = Fraction(1, 16 * max(sender.baud, receiver.baud))
+    bits = "".join(f"0{byte:08b}"[0] + f"{byte:08b}"[::-1] + "1" for byte in data)
+    levels = [int(bit) for bit in bits] + [1] * (10 + 10 * sender.baud // receiver.baud)
+
+    def level(time: Fraction) -> int:
+        index = int(time * sender.baud)
+        return levels[index] if index < len(levels) else 1
+
+    values, time, last = [], Fraction(0), 1
+    while time < Fraction(len(levels), sender.baud):
+        now = level(time)
+        if last and not now:
+            edge = time
+            samples = [level(edge + Fraction(2 * k + 1, 2 * receiver.baud)) for k in range(10)]
+            looked = 0 if samples[0] else 9
+            if looked and samples[9]:
+                values.append(sum(bit << k for k, bit in enumerate(samples[1:9])))
+            time, now = edge + Fraction(2 * looked + 1, 2 * receiver.baud), samples[looked]
+            time -= time % step
+        last = now
+        time += step
+    return values
+
+
+@given(st.binary(max_size=20), FORMATS)
+def test_equal_ends_understand_each_other(data, form):
+    mask = (1 << form.data_bits) - 1
+    assert heard(data, form, form) == [(byte & mask, False, False) for byte in data]
+
+
+@given(st.binary(max_size=40), st.floats(-0.04, 0.04))
+def test_small_rate_differences_are_tolerated(data, difference):
+    near = LineFormat(round(57_600 * (1 + difference)))
+    assert [value for value, *_ in heard(data, near, LineFormat(57_600))] == list(data)
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.binary(max_size=12), st.sampled_from([3, 5, 7]), st.booleans())
+def test_garbage_is_what_a_stepping_receiver_finds(data, ratio, faster):
+    """Odd ratios: no sample falls on an edge."""
+    ends = LineFormat(9600 * ratio), LineFormat(9600)
+    sender, receiver = ends if faster else ends[::-1]
+    found = [value for value, framing, _ in heard(data, sender, receiver) if not framing]
+    assert found == stepped(data, sender, receiver)
+
+
+def test_even_parity_reaches_a_receiver_without_parity_as_its_stop_bit():
+    even = LineFormat(57_600, parity="E")
+    found = heard(bytes([0x1F, 0x7F, 0x80, 0xFF]), even, LineFormat(57_600))
+    assert [(value, bad) for value, bad, _ in found] == [
+        (0x1F, False),
+        (0x7F, False),
+        (0x80, False),
+        (0xFF, True),  # eight ones: the parity bit is 0
+    ]
+
+
+def test_stop_bit_is_a_parity_of_1():
+    assert [heard(b, LineFormat(9600), LineFormat(9600, parity="E")) for b in (b"\1", b"\3")] == [
+        [(1, False, False)],
+        [(3, False, True)],
+    ]
+
+
+def test_receiver_recovers_after_noise():
+    sampler, fast = LineSampler(LineFormat(300)), LineFormat(1_000_000)
+    for index in range(10_000):
+        start_ps = index * 3 * fast.character_ps
+        sampler.put(0xFF, start_ps, fast)
+        list(sampler.take(start_ps))
+        assert len(sampler._edges) <= 2 * 120  # of half a bit at 300 baud
+
+
+@pytest.mark.parametrize(
+    ("settings", "text"),
+    [
+        *(({"baud": n}, rf"a baud rate in 1\.\.12000000, not {n}") for n in (0, -1, 12_000_001)),
+        ({"baud": 9600, "data_bits": 9}, "5 to 8 data bits, not 9"),
+        ({"baud": 9600, "parity": "X"}, "parity is N, E, O, M or S, not 'X'"),
+        ({"baud": 9600, "stop_bits": 3}, "1, 1.5 or 2 stop bits, not 3"),
+    ],
+)
+def test_rejects_impossible_line_settings(settings, text):
+    with pytest.raises(ValueError, match=text):
+        LineFormat(**settings)
+
+
+# --- at the device -----------------------------------------------------------------------------
+
+
+def desk_of(host: LineFormat) -> Desk:
+    desk = Desk(57_600)
+    desk.uart.host_form = host
+    return desk
+
+
+@given(st.binary(max_size=12), FORMATS, st.lists(st.integers(0, 10**9), max_size=4))
+def test_device_hears_what_its_receiver_makes_of_it(data, form, pauses):
+    """In one piece; and, when only a bit too slow, whatever the pauses of the writer."""
+    desk = desk_of(form)
+    desk.uart.host_writes(data)
+    desk.kernel.run()
+    found = heard(data, form, LineFormat(57_600))
+    assert desk.data == bytes(value for value, bad, _ in found if not bad)
+    assert desk.uart.framing_errors == sum(bad for _, bad, _ in found)
+    assert not desk.uart.busy
+
+    desk = desk_of(LineFormat(57_000))
+    for byte, pause_ps in zip(data, pauses, strict=False):
+        desk.uart.host_writes(bytes([byte]))
+        desk.kernel.advance_to(desk.kernel.now + pause_ps)
+    desk.kernel.run()
+    assert desk.data == data[: len(pauses)]
+
+
+def test_rate_of_a_slow_host_is_its_own():
+    desk = desk_of(LineFormat(300))
+    desk.uart.host_writes(bytes(10))
+    desk.kernel.advance_to(PS_PER_S // 3)
+    assert desk.uart.host_backlog == 0
+    assert not desk.received
+    assert desk.uart.framing_errors == 10
+    desk.kernel.run()
+    assert len(desk.silences) == 1
+
+
+def test_break_is_a_framing_error():
+    desk = desk_of(LineFormat(57_600))
+    desk.uart.host_breaks()
+    desk.kernel.run()
+    assert (desk.uart.framing_errors, desk.received) == (1, [])
+
+
+def test_unsent_bytes_can_be_purged():
+    desk = desk_of(LineFormat(57_600))
+    desk.uart.host_writes(b"abc")
+    desk.kernel.advance_to(desk.uart.byte_ps // 2)
+    desk.uart.host_drops()
+    desk.kernel.run()
+    assert desk.data == b"a"

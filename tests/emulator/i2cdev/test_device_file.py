@@ -11,6 +11,7 @@ from cubestack.emulator.i2cdev.device_file import DeviceFile
 from cubestack.firmware_model.formats import linux_i2c as linux
 
 READ = int(linux.MessageFlag.READ)
+LENGTH_FROM_DEVICE = READ | linux.MessageFlag.RECEIVE_LENGTH
 Ask = Callable[[linux.Call, bytes], tuple[int, bytes]]
 
 
@@ -160,6 +161,17 @@ def test_combined(ask: Ask, registers):
         ([linux.RdwrMessage(0x1A, READ | linux.MessageFlag.TEN_BIT, 1)], errno.EOPNOTSUPP),
         ([linux.RdwrMessage(0x1A, READ, 1), linux.RdwrMessage(0x30, READ, 1)], errno.ENXIO),
         ([linux.RdwrMessage(0x1A, 0, 2, b"\xf1\x00")], errno.EIO),
+        *(
+            ([linux.RdwrMessage(0x1A, LENGTH_FROM_DEVICE, length, first)], errno.EINVAL)
+            for length, first in ((32, b"\1"), (33, b"\0"), (33, b"\2"), (0, b""))
+        ),
+        (  # a length of 0
+            [
+                linux.RdwrMessage(0x1A, 0, 1, b"\0"),
+                linux.RdwrMessage(0x1A, LENGTH_FROM_DEVICE, 33, b"\1"),
+            ],
+            errno.EPROTO,
+        ),
     ],
 )
 def test_combined_errors(ask: Ask, messages, code):
@@ -171,9 +183,6 @@ def test_limits_are_reached(ask: Ask):
     assert len(rdwr(ask, linux.RdwrMessage(0x1A, READ, 8192))[1][0]) == 8192
 
 
-LENGTH_FROM_DEVICE = READ | linux.MessageFlag.RECEIVE_LENGTH
-
-
 def test_length_from_the_device(ask: Ask):
     messages = (
         linux.RdwrMessage(0x1A, 0, 1, b"\x05"),
@@ -181,27 +190,6 @@ def test_length_from_the_device(ask: Ask):
         linux.RdwrMessage(0x1A, READ, 1),
     )
     assert rdwr(ask, *messages) == (3, [b"", bytes([5, 6, 7, 8, 9, 10]), b"\x0b"])
-
-
-@pytest.mark.parametrize(
-    ("flags", "length", "first"),
-    [
-        (LENGTH_FROM_DEVICE, 32, b"\x01"),
-        (LENGTH_FROM_DEVICE, 33, b"\x00"),
-        (LENGTH_FROM_DEVICE, 33, b"\x02"),
-        (LENGTH_FROM_DEVICE, 0, b""),
-    ],
-)
-def test_length_from_the_device_needs_room(ask: Ask, flags, length, first):
-    assert rdwr(ask, linux.RdwrMessage(0x1A, flags, length, first)) == (-errno.EINVAL, [])
-
-
-def test_length_from_the_device_that_is_none(ask: Ask):
-    messages = (
-        linux.RdwrMessage(0x1A, 0, 1, b"\x00"),
-        linux.RdwrMessage(0x1A, LENGTH_FROM_DEVICE, 33, b"\x01"),
-    )
-    assert rdwr(ask, *messages) == (-errno.EPROTO, [])
 
 
 # --- SMBus --------------------------------------------------------------------------------------

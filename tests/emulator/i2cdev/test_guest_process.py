@@ -1,14 +1,22 @@
-"""Starting programs: routes that are not there say why."""
+"""Starting programs: routes that are not there say why; the library of the preload route."""
 
 import errno
 import os
+import stat
+import subprocess
+import sys
+from pathlib import Path
 from unittest.mock import Mock
 
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from cubestack.emulator.i2cdev import guest_process as program
 from cubestack.emulator.i2cdev.device_node import DeviceNode
+from cubestack.emulator.i2cdev.preload import shim
 from cubestack.emulator.i2cdev.seccomp.filter import native_abi
+from cubestack.emulator.native.compiler import CompilerError, NoCompilerError
 
 needs_abi = pytest.mark.skipif(native_abi() is None, reason="no filter for this machine")
 
@@ -52,3 +60,71 @@ def test_rejects_programs_that_cannot_be_preloaded(tmp_path, monkeypatch):
     monkeypatch.setattr(program, "is_static", lambda _path: True)
     with pytest.raises(program.RouteError, match=r"sh is linked statically, so no library"):
         program.start_preloaded(["sh"], {}, tmp_path / "none.so")
+
+
+needs_c = pytest.mark.skipif(shim.find_c_compiler() is None, reason="no C compiler here")
+
+
+@needs_c
+def test_built_once_of_each_source(tmp_path, monkeypatch):
+    library = shim.shim_library(tmp_path)
+    log = library.with_suffix(".log").read_text()
+    assert len(log.splitlines()) == 1, log  # the command, and no warning
+    with monkeypatch.context() as patch:
+        patch.setattr(shim, "_compile", None)
+        assert shim.shim_library(tmp_path) == library
+    source = tmp_path / "shim.c"
+    source.write_bytes(shim.SOURCE.read_bytes() + b"\n")
+    monkeypatch.setattr(shim, "SOURCE", source)
+    assert shim.shim_library(tmp_path) != library
+
+
+def test_a_compiler_that_fails(tmp_path, monkeypatch):
+    compiler = tmp_path / "cc"
+    compiler.write_text("#!/bin/sh\necho cannot; exit 1\n")
+    compiler.chmod(compiler.stat().st_mode | stat.S_IXUSR)
+    monkeypatch.setenv("CC", str(compiler))
+    with pytest.raises(CompilerError, match=r"failed; its log is .*\.log") as raised:
+        shim.shim_library(tmp_path)
+    log = str(raised.value).rsplit(" ", 1)[1]
+    assert "cannot" in Path(log).read_text()
+
+
+def test_without_a_compiler(tmp_path, monkeypatch):
+    monkeypatch.setattr(shim, "find_c_compiler", lambda: None)
+    with pytest.raises(NoCompilerError, match=r"no C compiler \(cc, gcc, clang"):
+        shim.shim_library(tmp_path)
+
+
+@needs_c
+def test_a_cache_that_can_not_be_written(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(CompilerError, match="can not use the cache folder"):
+        shim.shim_library(tmp_path / "file" / "cache")
+
+
+@needs_c
+@pytest.mark.parametrize("static", [True, False])
+def test_compiled_programs(tmp_path, static):
+    source, program = tmp_path / "program.c", tmp_path / "program"
+    source.write_text("int main(void) { return 0; }\n")
+    options = ["-static"] if static else []
+    command = [*shim.find_c_compiler(), *options, "-o", program, source]
+    if subprocess.run(command, capture_output=True, timeout=120).returncode:
+        pytest.skip("no static C library here")
+    assert shim.is_static(program) is static
+
+
+def test_rejects_programs_that_are_not_static(tmp_path):
+    script = tmp_path / "script"
+    script.write_text("#!/bin/sh\n" + "#" * 100)
+    for path in (Path(sys.executable), script, tmp_path, tmp_path / "missing"):
+        assert not shim.is_static(path)
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.binary(max_size=120))
+def test_any_bytes(tmp_path, rest):
+    program = tmp_path / "noise"
+    program.write_bytes(b"\x7fELF\x02\x01" + rest)
+    assert shim.is_static(program) in (True, False)

@@ -5,6 +5,7 @@ import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from dataclasses import dataclass, field
+from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
@@ -88,12 +89,6 @@ def test_one_event_after_the_other(running: Running) -> None:
     assert running.ask(lambda: running.port.held)
 
 
-@pytest.mark.parametrize("events", [0, -1, MOST_EVENTS + 1])
-def test_steps_have_a_limit(running: Running, events: int) -> None:
-    with pytest.raises(ValueError, match=f"1 to 100000 events, not {events}"):
-        running.ask(lambda: running.port.step(events))
-
-
 def test_runs_to_a_time_and_stops(running: Running) -> None:
     goal_ps = 30 * PS_PER_S  # far more than passes on the wall
     arrived: Future[int] = running.ask(lambda: running.port.run_to(goal_ps))
@@ -128,15 +123,13 @@ def test_new_request_ends_a_run(running: Running) -> None:
         arrived.result(SOON_S)
 
 
-def test_no_catching_up_after_a_jump() -> None:
-    running = Running("real")
-    running.thread.start()
-    arrived: Future[int] = running.ask(lambda: running.port.run_to(1000 * PS_PER_S))
+@pytest.mark.parametrize("running", ["real"], indirect=True)
+def test_no_catching_up_after_a_jump(running: Running) -> None:
+    arrived: Future[int] = running.ask(lambda: running.port.run_to(100 * PS_PER_S))
     arrived.result(SOON_S)
     running.ask(running.port.resume)
     now_s = running.ask(lambda: running.kernel.now / PS_PER_S)
-    assert 1000 <= now_s < 1000 + SOON_S
-    running.end()
+    assert 100 <= now_s < 100 + SOON_S
 
 
 @pytest.mark.parametrize("speed", [0.5, 20.0])
@@ -159,10 +152,13 @@ def test_speed_is_kept_on_a_simulated_wall_clock(speed: float) -> None:
     port.close()
 
 
-@pytest.mark.parametrize("speed", [0.0, -1.0, float("nan"), 1e6])
-def test_speeds_have_limits(running: Running, speed: float) -> None:
-    with pytest.raises(ValueError, match=r"0\.001 to 1000"):
-        running.ask(lambda: running.port.set_pace("real", speed))
+def test_speeds_and_steps_have_limits(running: Running) -> None:
+    for speed in (0.0, -1.0, float("nan"), 1e6):
+        with pytest.raises(ValueError, match=r"0\.001 to 1000"):
+            running.ask(partial(running.port.set_pace, "real", speed))
+    for events in (0, -1, MOST_EVENTS + 1):
+        with pytest.raises(ValueError, match=f"1 to 100000 events, not {events}"):
+            running.ask(partial(running.port.step, events))
 
 
 def test_reports_other_holders(running: Running) -> None:
@@ -180,3 +176,54 @@ def test_call_after_the_end_raises() -> None:
     for asked in (waiting, running.port.call(lambda: 2)):
         with pytest.raises(RuntimeError, match="the emulation has ended"):
             asked.result(SOON_S)
+
+
+class Desk:
+    def __init__(self, mode: str = "real", ns: int = 1_000_000_007) -> None:
+        self.ns, self.kernel = ns, Kernel()
+        self.pace = Pace(self.kernel, mode, lambda: self.ns)  # type: ignore[arg-type]
+
+
+def test_the_scale_begins_where_virtual_time_is() -> None:
+    desk = Desk()
+    assert (desk.pace.now_ps(), desk.pace.now_ns()) == (0, desk.ns)
+    desk.ns += 5
+    assert desk.pace.now_ps() == 5000
+    desk.kernel.run(until=7_000_000)
+    desk.pace.align()
+    assert desk.pace.now_ps() == 7_000_000
+    desk.ns += 3
+    assert desk.pace.now_ps() == 7_003_000
+
+
+@pytest.mark.parametrize("speed", [1.0, 2.0, 0.25, 3.7])
+def test_a_speed_holds_from_its_change_on(speed: float) -> None:
+    desk = Desk()
+    desk.ns += 1000
+    desk.kernel.run(until=desk.pace.now_ps())
+    desk.pace.change("real", speed)
+    assert desk.pace.now_ps() == pytest.approx(1_000_000, abs=1)
+    desk.ns += 2000
+    assert desk.pace.now_ps() == pytest.approx(1_000_000 + 2_000_000 * speed, abs=2)
+
+
+@pytest.mark.parametrize("speed", [1.0, 2.0, 0.5, 3.7])
+def test_conversions_agree_and_never_round_early(speed: float) -> None:
+    desk = Desk()
+    desk.kernel.run(until=12_345)
+    desk.pace.change("real", speed)
+    for ps in (12_345, 12_346, 13_345, 13_344, 999_999, 10**9 + 1):
+        ns = desk.pace.ns_at(ps)
+        assert desk.pace.ps_at(ns) >= ps - 1
+        assert desk.pace.ps_at(ns - 1) < ps
+    if speed == 1.0:
+        at = desk.pace.now_ns()
+        assert [desk.pace.ns_at(12_345 + ps) - at for ps in (0, 1, 1000, 1001)] == [0, 1, 1, 2]
+
+
+def test_the_mode_says_who_waits() -> None:
+    desk = Desk("fast")
+    assert desk.pace.fast
+    desk.pace.change("real")
+    assert not desk.pace.fast
+    assert desk.pace.speed == 1.0

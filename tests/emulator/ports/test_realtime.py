@@ -156,12 +156,7 @@ def test_reports_lag(bench):
     lags = [float(text.split()[5]) for _, text in bench.reports]
     assert lags == [pytest.approx(2.5, abs=0.1), pytest.approx(5.0, abs=0.1)]
     assert bench.reports[0][1].startswith("can not keep real time: ")
-
-
-def test_ports_are_served_while_the_machine_lags(bench):
-    bench.tick(PS_PER_MS, cost_ns=2 * NS_PER_MS)
-    bench.run("real", 1000)
-    assert len(bench.port.exchanges) >= 1 / (2 * SLICE_S)
+    assert len(bench.port.exchanges) >= 10 / (2 * SLICE_S)  # ports are served meanwhile
 
 
 def test_lag_that_was_recovered_is_not_reported(bench):
@@ -183,16 +178,12 @@ def test_short_delay_is_not_reported(bench):
 def test_work_runs_ahead_of_wall_time(bench):
     ticks = bench.tick(10 * PS_PER_MS, until_ps=100 * PS_PER_S)
     bench.busy = lambda: bench.kernel.now < 100 * PS_PER_S
-    bench.run("fast", 1000)
-    assert ticks[-1][0] == 100_000
-    assert ticks[-1][1] < 1000
-    assert len(bench.port.exchanges) > ticks[-1][1] / (2 * SLICE_S * 1000)
-
-
-def test_virtual_time_follows_wall_time_when_the_work_is_done(bench):
-    bench.tick(10 * PS_PER_MS, until_ps=100 * PS_PER_S)
-    bench.busy = lambda: bench.kernel.now < 100 * PS_PER_S
     bench.run("fast", 3000)
+    worked_ms, end_ms = ticks[-1]
+    assert (worked_ms, end_ms < 1000) == (100_000, True)
+    served = sum(ms < end_ms for ms in bench.port.wall_ms)
+    assert served > end_ms / (2 * SLICE_S * 1000)
+    # When the work is done, virtual time follows wall time.
     passed_ms = bench.kernel.now / PS_PER_MS - 100_000
     assert 1000 < passed_ms < 3000
     assert min(bench.wall.waits) > 0.9 * IDLE_S

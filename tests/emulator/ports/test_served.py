@@ -1,15 +1,34 @@
-"""The ports served by the scheduler in a thread, for programs that know nothing of us."""
+"""The ports served by the scheduler, for programs that know nothing of us, and for bad clients.
+
+``tests/system/test_bad_clients.py`` does the latter to the command, in wall time.
+"""
 
 import contextlib
 import os
 import shutil
+import socket
 import subprocess
+import tracemalloc
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 import serial
 
-from .conftest import ALL_BYTES, TIMEOUT_S, open_client, served
+from cubestack.emulator.bus.i2c import I2cBus
+from cubestack.emulator.i2cdev.adapter import I2cAdapter
+from cubestack.emulator.i2cdev.server import I2cServer
+from cubestack.emulator.ports.pace import Pace
+from cubestack.emulator.ports.pseudo_terminal import PtyEndpoint
+from cubestack.emulator.ports.realtime import RealtimeScheduler
+from cubestack.emulator.ports.serial_port import MAX_UNREAD, MAX_UNSENT
+from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
+from cubestack.firmware_model.formats import linux_i2c
+
+from ..bus.ends import Memory
+from ..i2cdev.conftest import packed
+from .conftest import ALL_BYTES, TIMEOUT_S, Client, Device, open_client, open_port, served
 
 # pyserial calls setDaemon and setName of a thread.
 pytestmark = pytest.mark.filterwarnings("ignore:set(Daemon|Name):DeprecationWarning")
@@ -111,3 +130,129 @@ def test_plain_shell(port, device, path):
     with served(device, port, "fast"):
         script = f"exec 3<>{path}; printf 'hello' >&3; head -c 5 <&3"
         assert run("sh", "-c", script) == b"hello"
+
+
+NS_PER_MS = 1_000_000
+SPARE_BYTES = 1_000_000
+ADDRESS = 0x1A
+HALF_A_FRAME = b"\x1f\x7f\x14"
+SERIAL = ("pty", "tcp", "rfc2217")
+ROLES = {"flood": 1, "unread": 2000, "stopped": 1, "polite": 1}
+"""Who is at a line, and how many bytes the device answers to each byte on it."""
+
+
+def serve(kernel: Kernel, ports, busy, waits: int, step: Callable[[int], None]) -> None:
+    """A step in each wait; wall time passes in waits, as rounded by ``wait_ready``."""
+    ns = number = 0
+
+    def clock() -> int:
+        nonlocal ns
+        ns += 1000
+        return ns
+
+    def wait(_watched, timeout_s: float) -> None:
+        nonlocal ns, number
+        number += 1
+        step(number)
+        ns += max(NS_PER_MS, int(timeout_s * 1e9))
+        if number == waits:
+            scheduler.stop()
+
+    scheduler = RealtimeScheduler(kernel, ports, busy, Pace(kernel, "real", clock), wait=wait)
+    scheduler.run()
+
+
+SLAVE = linux_i2c.pack_ioctl(linux_i2c.Ioctl.SLAVE, ADDRESS)
+SET_ADDRESS = packed(linux_i2c.Call.IOCTL, SLAVE)
+READING = linux_i2c.pack_rdwr([linux_i2c.RdwrMessage(ADDRESS, 1, 8)])
+READ_BYTES = packed(linux_i2c.Call.RDWR, READING)
+
+
+class Desk:
+    """Every bad client and a polite one on each kind of port, and a bus for four of them."""
+
+    def __init__(self, folder, stack: contextlib.ExitStack) -> None:
+        self.kernel = Kernel()
+        self.lines: dict[tuple[str, str], Device] = {}
+        self.ports: dict[tuple[str, str], Any] = {}
+        self.clients: dict[tuple[str, str], Client] = {}
+        for kind in SERIAL:
+            for role, answers in ROLES.items():
+                line = self.lines[kind, role] = Device(self.kernel, 115_200, answers)
+                port = self.ports[kind, role] = open_port(kind, folder / f"tty{role}", line.uart)
+                stack.callback(port.close)
+                self.clients[kind, role] = open_client(port)
+        bus = I2cBus(self.kernel)
+        bus.attach(ADDRESS, Memory())
+        self.adapter = I2cAdapter(self.kernel, bus)
+        self.server = I2cServer(folder / "i2c" / "bus", self.adapter)
+        stack.callback(self.server.close)
+        for role in ROLES:
+            connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+            connection.connect(self.server.name)
+            self.clients["i2c", role] = Client(connection)
+        for client in self.clients.values():
+            stack.callback(client.close)
+
+    def busy(self) -> bool:
+        return self.adapter.busy or any(line.uart.busy for line in self.lines.values())
+
+
+def test_polite_clients_are_served_beside_bad_ones(tmp_path):
+    """On each kind of port one floods, one never reads, one stops in mid-frame.
+
+    The fourth exchanges a byte a wait.
+    """
+    with contextlib.ExitStack() as stack:
+        desk = Desk(tmp_path, stack)
+        for kind in SERIAL:
+            desk.clients[kind, "stopped"].write(HALF_A_FRAME)
+        desk.clients["i2c", "stopped"].write(READ_BYTES[:-1])
+        got = dict.fromkeys((*SERIAL, "i2c"), 0)
+
+        def step(number: int) -> None:
+            for kind, count in got.items():
+                question = READ_BYTES if kind == "i2c" else b"?"
+                desk.clients[kind, "flood"].write((SET_ADDRESS + question) * 2000)
+                desk.clients[kind, "flood"].read_now()
+                desk.clients[kind, "unread"].write(question * 100)
+                got[kind] = count + len(desk.clients[kind, "polite"].read_now())
+                desk.clients[kind, "polite"].write(question)
+            if number == 200:
+                tracemalloc.start()
+
+        serve(desk.kernel, [*desk.ports.values(), desk.server], desk.busy, 600, step)
+        grown, peak = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+        assert desk.kernel.now > PS_PER_S // 2
+        full = 0.8 * desk.kernel.now / PS_PER_S * 11_520
+        assert full > 1000
+        for kind in SERIAL:
+            assert len(desk.lines[kind, "polite"].received) >= 590
+            assert got[kind] >= 580
+            assert len(desk.lines[kind, "flood"].received) > full  # its wire is
+            assert desk.lines[kind, "flood"].uart.host_backlog <= MAX_UNSENT
+            assert desk.lines[kind, "stopped"].received == HALF_A_FRAME
+            assert len(desk.ports[kind, "unread"]._unread) <= MAX_UNREAD
+        assert got["i2c"] > 200 * (linux_i2c.LENGTH.size + 4 + 8)
+        assert desk.server.clients == len(ROLES)
+        assert (grown, peak) < (SPARE_BYTES, SPARE_BYTES)
+
+
+def test_two_lines_of_a_device_at_once(tmp_path):
+    """As a CubeSense has them, with rates of their own."""
+    kernel = Kernel()
+    lines = [Device(kernel, 115_200, answers) for answers in (1, 3)]
+    with contextlib.ExitStack() as stack:
+        ports = [PtyEndpoint(tmp_path / f"tty{line.answers}", line.uart) for line in lines]
+        clients = [open_client(port) for port in ports]
+        for thing in (*ports, *clients):
+            stack.callback(thing.close)
+
+        def step(number: int) -> None:
+            if number == 2:
+                clients[0].write(b"abc")
+                clients[1].write(b"q")
+
+        serve(kernel, ports, lambda: any(line.uart.busy for line in lines), 20, step)
+        assert (clients[0].read(3), clients[1].read(3)) == (b"abc", b"qqq")

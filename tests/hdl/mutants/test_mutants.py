@@ -50,7 +50,7 @@ def test_same_seed_gives_the_same_mutants(counter: Netlist, every: list[Mutant])
 def test_netlist_is_the_same_everywhere(counter: Netlist) -> None:
     assert netlist(CounterAlone(COLUMNS, ROWS)) == counter
     assert str(Path(__file__).parent.anchor) + "home" not in counter.text
-    assert 'src "matrix_counter.py:' in counter.text
+    assert 'src "counters.py:' in counter.text
     assert "\\init" not in counter.text
 
 
@@ -76,7 +76,7 @@ def test_where_no_state_differs_is_proved(every: list[Mutant], equivalence: Equi
     """The last column is 2, so its lower bit need not be looked at: 3 never comes."""
     text = Path(counters.__file__).read_text(encoding="utf-8").splitlines()
     (line,) = (n for n, row in enumerate(text, 1) if "self.last_column.eq(" in row)
-    wanted = ("const0", "A", 0, f"matrix_counter.py:{line}")
+    wanted = ("const0", "A", 0, f"counters.py:{line}")
     last = next(m for m in every if (m.mode, m.port, m.bit, *m.source) == wanted)
     assert equivalence.compare(last).equivalent
 

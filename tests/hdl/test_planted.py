@@ -1,4 +1,4 @@
-"""Bugs planted by hand in the source of the designs, for the regression to catch."""
+"""Bugs planted by hand in the source of the designs: the tier of each top that has one finds it."""
 
 import sys
 from collections.abc import Iterator
@@ -9,6 +9,10 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
+
+from cubestack.hdl.flow.generate import verilog_text
+from tests.hdl.regression import FULL, TIERS, run_tier
+from tests.tiers import quick
 
 
 @dataclass(frozen=True)
@@ -37,11 +41,11 @@ _LAST = "((self.rows - 1) << (self.columns - 1).bit_length()) + self.columns - 1
 #: By kind: title, module and tops of each; the text that it replaces, and the wrong one.
 _BY_KIND = {
     "off by one": {
-        ("a row ends a column early", "blocks.matrix_counter", (*WRITERS, BOARDS)): (
+        ("a row ends a column early", "blocks.counters", (*WRITERS, BOARDS)): (
             "column == self._columns - 1",
             "column == self._columns - 2",
         ),
-        ("a frame has a row more", "blocks.matrix_counter", WRITERS): (
+        ("a frame has a row more", "blocks.counters", WRITERS): (
             "row == self._rows - 1",
             "row == self._rows % (1 << len(row))",
         ),
@@ -50,16 +54,16 @@ _BY_KIND = {
             "size.rows - 2, size.columns - 1",
         ),
         ("the Sun window starts a column too far right", "cubesense.sun_window", (PAIR,)): (
-            "right, last_column = self._position(m, size.window_left, in_window)",
-            "right, last_column = self._position(m, size.window_left - 1, in_window)",
+            'right, last_column = self._position(m, "right", size.window_left, in_window)',
+            'right, last_column = self._position(m, "right", size.window_left - 1, in_window)',
         ),
-        ("a gap is one clock shorter", "blocks.frame_gap", (PAIR,)): (
+        ("a gap is one clock shorter", "blocks.frames", (PAIR,)): (
             "low_clocks == self._clocks",
             "low_clocks == self._clocks - 1",
         ),
     },
     "swapped condition": {
-        ("a line is taken while HSYNC is low", "blocks.frame_writer", WRITERS): (
+        ("a line is taken while HSYNC is low", "blocks.frames", WRITERS): (
             "                self.hsync\n                & self.vsync\n",
             "                ~self.hsync\n                & self.vsync\n",
         ),
@@ -77,15 +81,15 @@ _BY_KIND = {
         ),
     },
     "missing reset": {
-        ("a store that begins inside of a line takes it", "blocks.frame_writer", (STAR,)): (
+        ("a store that begins inside of a line takes it", "blocks.frames", (STAR,)): (
             "between_lines_seen = Signal()",
             "between_lines_seen = Signal(reset_less=True)",
         ),
-        ("rows are counted on", "blocks.matrix_counter", (STAR, PAIR)): (
+        ("rows are counted on", "blocks.counters", (STAR, PAIR)): (
             "row = Signal(range(self._rows))",
             "row = Signal(range(self._rows), reset_less=True)",
         ),
-        ("a short last row is not forgotten", "blocks.frame_writer", (STAR,)): (
+        ("a short last row is not forgotten", "blocks.frames", (STAR,)): (
             "frame_full = Signal()  # the",
             "frame_full = Signal(reset_less=True)  # the",
         ),
@@ -133,14 +137,14 @@ _BY_KIND = {
         ),
     },
     "late ACK": {
-        ("one pixel clock", "blocks.frame_writer", WRITERS): (
+        ("one pixel clock", "blocks.frames", WRITERS): (
             "self.ack.eq(self.ack | (storing_last_column & counter.last_row)),",
             "(late := Signal()).eq(storing_last_column & counter.last_row),\n"
             "            self.ack.eq(self.ack | late),",
         )
     },
     "early ACK": {
-        ("a row", "blocks.frame_writer", WRITERS): (
+        ("a row", "blocks.frames", WRITERS): (
             "self.ack.eq(self.ack | (storing_last_column & counter.last_row)),",
             "self.ack.eq(self.ack | (self.store & counter.last_row)),",
         ),
@@ -150,20 +154,17 @@ _BY_KIND = {
             f"self.ACK.eq(writer.ack | (writer.store & (writer.address == {_LAST})))\n",
         ),
         ("before the last write pulse", "cubesense.top", (PAIR,)): (
-            "self.ACK.eq(own_writer.ack | link_writer.ack)",
-            "self.ACK.eq(own_writer.ack | link_writer.ack | (own_writer.store & (own_writer.address"
+            "self.ACK.eq(own_ack | link_writer.ack)",
+            "self.ACK.eq(own_ack | link_writer.ack | (own_writer.store & (own_writer.address"
             f" == {_LAST.replace('self.', 'self.read_out.')})))",
         ),
     },
     "extra WE pulse": {
-        ("after the last pixel", "blocks.frame_writer", WRITERS): (
+        ("after the last pixel", "blocks.frames", WRITERS): (
             "self.store.eq(accept),",
             "self.store.eq(accept | (storing_last_column & counter.last_row)),",
         ),
-        ("after a row", "blocks.frame_writer", WRITERS): (
-            "                & ~storing_last_column\n",
-            "",
-        ),
+        ("after a row", "blocks.frames", WRITERS): ("                & ~storing_last_column\n", ""),
         ("in the clock's high half", "cubestar.top", (STAR,)): (
             "self.SRAM_WE_N.eq(~writer.store | self.PIXCLK)",
             "self.SRAM_WE_N.eq(~writer.store)",
@@ -204,3 +205,59 @@ def planted(bug: Bug) -> Iterator[dict[str, object]]:
                     if vars(other).get(key) is right:
                         patch.setattr(other, key, wrong)
         yield {name: wrong for name, (_, wrong) in replaced.items()}
+
+
+pytestmark = [
+    pytest.mark.cocotb,
+    pytest.mark.filterwarnings("ignore::amaranth.hdl.UnusedElaboratable"),
+]
+
+#: One of each kind, on the published board, is tried in `make test` too.
+QUICK = {bug.kind: bug for bug in reversed(BUGS) if STAR in bug.tops}
+KINDS = dict.fromkeys(bug.kind for bug in BUGS)
+CASES = [
+    pytest.param(bug, top, id=f"{bug.kind}, {bug.title}, {bug.module}-{top}")
+    for bug in BUGS
+    for top in bug.tops
+    if FULL or (top == STAR and bug is QUICK[bug.kind])
+]
+
+
+def wrong_verilog(bug: Bug, top: str) -> str:
+    tier = TIERS[top]
+    with planted(bug) as names:
+        design = names.get(tier.design.__name__, tier.design)
+        return verilog_text(design(tier.columns, tier.rows), "dut")
+
+
+@pytest.mark.parametrize(("bug", "top"), quick(CASES, 4))
+def test_is_caught(bug: Bug, top: str, tmp_path: Path) -> None:
+    (tmp_path / "dut.v").write_text(wrong_verilog(bug, top), encoding="utf-8")
+    outcome = run_tier(top, tmp_path / "dut.v", tmp_path / "tier")
+    assert outcome.failed, outcome.problem or "not caught"
+
+
+def test_every_kind_is_planted_in_both_sensors() -> None:
+    for kind in KINDS:
+        tops = {top for bug in BUGS if bug.kind == kind for top in bug.tops}
+        assert {"cubestar", "cubesense-pair"} <= tops, kind
+
+
+def test_document_has_every_bug() -> None:
+    document = Path(__file__).parents[2] / "docs" / "gateware-tests.md"
+    _, _, section = document.read_text(encoding="utf-8").partition("| Kind | Bugs |\n|---|---|\n")
+    titles = {kind: dict.fromkeys(b.title for b in BUGS if b.kind == kind) for kind in KINDS}
+    rows = [f"| {kind} | {'; '.join(those)} |" for kind, those in titles.items()]
+    assert section.startswith("\n".join([*rows, "\n"]))
+
+
+def test_nothing_is_left_behind() -> None:
+    before = verilog_text(TIERS[STAR].make(), "dut")
+    wrong_verilog(BUGS[0], STAR)
+    assert verilog_text(TIERS[STAR].make(), "dut") == before
+
+
+def test_missing_text_is_an_error() -> None:
+    bug = Bug("", "", "blocks.frames", "no such text", "", (STAR,))
+    with pytest.raises(ValueError, match="has 'no such text' 0 times, not once"):
+        wrong_verilog(bug, STAR)
