@@ -152,7 +152,7 @@ def test_speed_is_kept_on_a_simulated_wall_clock(speed: float) -> None:
     port.close()
 
 
-def test_speeds_and_steps_have_limits(running: Running) -> None:
+def test_speeds_have_limits(running: Running) -> None:
     for speed in (0.0, -1.0, float("nan"), 1e6):
         with pytest.raises(ValueError, match=r"0\.001 to 1000"):
             running.ask(partial(running.port.set_pace, "real", speed))

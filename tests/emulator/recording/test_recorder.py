@@ -129,7 +129,7 @@ def test_delay_is_named(tmp_path):
     assert difference.endswith("same bytes, +1000.000 us in time")
 
 
-def test_failed_transfer_is_recorded_and_another_failure_named(tmp_path):
+def test_failed_transfer_is_recorded(tmp_path):
     device, path = Device(), tmp_path / "a.rec"
     transfer = device.bus.transfer([I2cMessage(0x1B, bytearray(b"\xee"))])
     with recorded(path, device), pytest.raises(I2cError):
