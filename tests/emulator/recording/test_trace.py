@@ -2,15 +2,12 @@
 
 import io
 import re
-from collections import defaultdict
 from fractions import Fraction
-from typing import Any, BinaryIO
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from vcd.reader import TokenKind, tokenize
 
 from cubestack.emulator.boards.cubestar.wiring import cubestar_wiring
 from cubestack.emulator.bus.i2c import I2cBus, I2cMessage
@@ -22,6 +19,7 @@ from cubestack.emulator.rtl.factory import make_engine
 from cubestack.emulator.sim.virtual_time import Kernel
 
 from ..bus.ends import Memory
+from .vcd import read
 
 BAUD = 57_600
 
@@ -158,31 +156,3 @@ def test_a_window_that_is_over_is_refused() -> None:
     for start, end, step in ((0, 10**9, 1), (10**9, 10**9, 1), (10**9, 10**10, 0)):
         with pytest.raises(ValueError, match="empty or past scope window"):
             Scope(engine, PINS, start, end, step)
-
-
-Changes = dict[str, list[tuple[int, Any]]]
-
-
-def read(stream: BinaryIO) -> Changes:
-    """Changes (ns, value) of each variable by its dotted name without the device's."""
-    names: dict[str, str] = {}
-    scope: list[str] = []
-    time_ns = 0
-    changes: Changes = defaultdict(list)
-    for token in tokenize(stream):
-        match token.kind:
-            case TokenKind.SCOPE:
-                scope.append(token.scope.ident)
-            case TokenKind.UPSCOPE:
-                scope.pop()
-            case TokenKind.VAR:
-                names[token.var.id_code] = ".".join([*scope[1:], token.var.reference])
-            case TokenKind.CHANGE_TIME:
-                assert token.time_change >= time_ns
-                time_ns = token.time_change
-            case TokenKind.CHANGE_SCALAR | TokenKind.CHANGE_VECTOR | TokenKind.CHANGE_STRING:
-                change: Any = token.data
-                value = change.value
-                plain = int(value) if isinstance(value, str) and value in ("0", "1") else value
-                changes[names[change.id_code]].append((time_ns, plain))
-    return changes
