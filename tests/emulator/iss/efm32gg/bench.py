@@ -12,7 +12,7 @@ from cubestack.firmware_model.interface.efm32gg import LAYOUTS
 from cubestack.firmware_model.interface.efm32gg.c_header import c_header
 from tests.emulator.iss.cross_compiler import binary_of, compile_for_m3
 
-NS, US, MS, S = 10**3, 10**6, 10**9, 10**12
+US, MS, S = 10**6, 10**9, 10**12
 START_UP = 163 * US
 LOOP, WFI = 0xE7FE, 0xBF30
 POWER_ON, PIN_RESET, WATCHDOG, LOCK_UP, SYSTEM_REQUEST = 0x1, 0x8, 0x10, 0x20, 0x40

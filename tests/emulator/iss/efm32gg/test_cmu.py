@@ -69,18 +69,6 @@ def test_oscillator_of_the_core_cannot_be_switched_off() -> None:
     assert "cannot be switched off" in bench.log()
 
 
-def test_locked_registers_keep_their_values() -> None:
-    bench = Bench()
-    bench["CMU.LOCK"] = 0
-    assert bench["CMU.LOCK"] == 1
-    bench.load("CMU", HFPERCLKEN0=1, LFACLKEN0=1)
-    assert (bench["CMU.HFPERCLKEN0"], bench["CMU.LFACLKEN0"]) == (0, 0)
-    bench["CMU.LOCK"] = 0x580E
-    assert bench["CMU.LOCK"] == 0
-    bench["CMU.HFPERCLKEN0"] = 1
-    assert bench["CMU.HFPERCLKEN0"] == 1
-
-
 def test_low_frequency_registers_wait_for_their_clock() -> None:
     bench = Bench()
     bench["CMU.LFACLKEN0"] = 2

@@ -93,14 +93,6 @@ def test_em2block_limits_sleep_to_em1() -> None:
     assert modes(bench) == [1]
 
 
-def test_emu_lock() -> None:
-    bench = Bench()
-    bench.load("EMU", LOCK=0, CTRL=2)
-    assert (bench["EMU.LOCK"], bench["EMU.CTRL"]) == (1, 0)
-    bench.load("EMU", LOCK=0xADE8, CTRL=2)
-    assert bench["EMU.CTRL"] == 2
-
-
 def test_em4_needs_its_sequence_and_a_pin_ends_it_by_a_reset() -> None:
     bench = Bench().clock("GPIO")
     bench["GPIO.PA_MODEL"] = 1

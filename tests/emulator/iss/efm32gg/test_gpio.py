@@ -85,8 +85,6 @@ def test_locked_port_keeps_its_modes() -> None:
     bench = gpio()
     bench.load("GPIO", LOCK=0, PA_MODEL=PUSH_PULL, EXTIPSELL=1, PA_DOUT=5)
     assert (bench["GPIO.PA_MODEL"], bench["GPIO.EXTIPSELL"], bench["GPIO.PA_DOUT"]) == (0, 0, 5)
-    bench.load("GPIO", LOCK=0xA534, PA_MODEL=PUSH_PULL)
-    assert bench["GPIO.PA_MODEL"] == PUSH_PULL
 
 
 def test_locked_pin_keeps_mode_and_level_until_a_reset() -> None:

@@ -83,6 +83,26 @@ def test_unit_without_clock_reads_0_and_ignores_writes() -> None:
     assert bench.log() == ""
 
 
+@pytest.mark.parametrize(
+    ("unit", "key", "register", "value"),
+    [
+        ("EMU", 0xADE8, "CTRL", 2),
+        ("CMU", 0x580E, "HFPERCLKEN0", 1),
+        ("CMU", 0x580E, "LFACLKEN0", 1),
+        ("GPIO", 0xA534, "PA_MODEL", 4),
+    ],
+)
+def test_locked_register_keeps_its_value_until_the_key_is_written(
+    unit: str, key: int, register: str, value: int
+) -> None:
+    bench = Bench()
+    if unit == "GPIO":
+        bench.clock("GPIO")
+    for lock, expected in ((0, (1, 0)), (key, (0, value))):
+        bench.load(unit, **{"LOCK": lock, register: value})
+        assert (bench[f"{unit}.LOCK"], bench[f"{unit}.{register}"]) == expected
+
+
 def test_unmodelled_unit_is_reported_once() -> None:
     bench = Bench().clock("AES")
     for _ in range(3):

@@ -37,16 +37,13 @@ def test_packets_are_found_in_a_stream_cut_anywhere(bodies: list[bytes], step: i
     assert deframer.replies == b"+" * len(bodies)
 
 
-def test_wrong_checksum_is_not_acknowledged() -> None:
-    deframer = Deframer()
-    assert list(deframer.feed(b"$g#00")) == []
-    assert deframer.replies == b"-"
-
-
-def test_checksum_is_ignored_without_acknowledgements() -> None:
-    deframer = Deframer(acknowledging=False)
-    assert list(deframer.feed(b"$g#00")) == [b"g"]
-    assert deframer.replies == b""
+@pytest.mark.parametrize(("checked", "found", "reply"), [(True, [], b"-"), (False, [b"g"], b"")])
+def test_wrong_checksum_is_rejected_if_packets_are_acknowledged(
+    checked: bool, found: list[bytes], reply: bytes
+) -> None:
+    deframer = Deframer(acknowledging=checked)
+    assert list(deframer.feed(b"$g#00")) == found
+    assert deframer.replies == reply
 
 
 def test_byte_03_is_an_interrupt_only_between_packets() -> None:
