@@ -1,4 +1,4 @@
-"""The checks of the protocol suite: a run on one target and its results.
+"""The checks of the protocol suite: a run on one target, its results, and the values to try.
 
 The sources don't specify answer times. An answer is late if, without its time on the wire, it takes
 longer than real hosts' poll period.
@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from enum import Enum
 
-from cubestack.firmware_model.interface.codec.field import Value
+from cubestack.firmware_model.interface.codec.field import Field, InterfaceError, Value
 from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.clients.registers import RegisterClient
@@ -179,3 +179,67 @@ class CheckRun:
         """The device's virtual time if emulated here, else wall time."""
         controls = self.target.controls
         return time.monotonic() if controls is None else controls.time_s()
+
+
+def values_to_try(message: Message) -> Iterator[dict[str, Value]]:
+    """Allowed values of all fields: reset, smallest, largest, in between, single ones."""
+    reset = message.reset_values()
+    candidates = [reset]
+    for share in (0.0, 1.0, 0.5):
+        values: dict[str, Value] = {}
+        for one in message.fields:
+            low, high = limits_of(one)
+            value = low + share * (high - low)
+            integer = one.type != "f32" and one.scale == 1
+            values[one.name] = int(value) if integer else value
+        candidates.append(values)
+    floats = [one.name for one in message.fields if one.type == "f32"]
+    candidates += [reset | {name: 1.0} for name in floats]  # unit vectors among them
+    seen = []
+    for values in candidates:
+        try:
+            carried = message.unpack(message.pack(**values))
+        except InterfaceError:
+            continue
+        if not message.violations(carried) and carried not in seen:
+            seen.append(carried)
+            yield carried
+
+
+def limits_of(one: Field) -> tuple[float, float]:
+    if one.choices is not None:
+        values = [int(choice) for choice in one.choices]
+        return min(values), max(values)
+    if one.type.startswith("bytes"):
+        return 0, 0
+    low, high = (0.0, 1.0) if one.type == "f32" else _raw_limits(one)
+    least, most = one.ends
+    return (low if least is None else least, high if most is None else most)
+
+
+def _raw_limits(one: Field) -> tuple[float, float]:
+    low, high = one.raw_range
+    return low / one.scale, high / one.scale
+
+
+def violations(message: Message) -> Iterator[tuple[Field, bytes]]:
+    """For each field with limits: the field, and parameters with only this field out of range."""
+    reset = message.reset_values()
+    for one in message.fields:
+        if one.type.startswith("bytes"):
+            continue
+        tries: list[float] = []
+        if one.type == "f32":
+            tries.append(float("nan"))
+        else:
+            tries += _raw_limits(one)
+        low, high = limits_of(one)
+        tries += [low - 1 / one.scale, high + 1 / one.scale]
+        for value in reversed(tries):
+            try:
+                data = message.pack(**(reset | {one.name: value}))
+            except (InterfaceError, ValueError, OverflowError):
+                continue
+            if one in [wrong for wrong, _ in message.violations(message.unpack(data))]:
+                yield one, data
+                break

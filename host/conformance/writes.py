@@ -10,9 +10,15 @@ from cubestack.firmware_model.interface.codec.field import Field, Value
 from cubestack.firmware_model.interface.codec.letters import Letter, LetterProtocol
 from cubestack.firmware_model.interface.codec.message import TELEMETRY_BIT, Message
 from cubestack.firmware_model.interface.codec.register_pointer import PointerRegister
-from cubestack.host.conformance.contract import CheckRun, FailedError, SkippedError
+from cubestack.host.conformance.contract import (
+    CheckRun,
+    FailedError,
+    SkippedError,
+    limits_of,
+    values_to_try,
+    violations,
+)
 from cubestack.host.conformance.effects import OF_SWITCHES
-from cubestack.host.conformance.values import limits_of, values_to_try, violations
 from cubestack.host.devices.shown_settings import keys_of, read_back
 from cubestack.host.errors import CommandRefusedError
 from cubestack.host.transport.streams import READ_BYTES, Transport, read_answer

@@ -9,7 +9,7 @@ from cubestack.firmware_model.interface.codec.field import InterfaceError, Value
 from cubestack.firmware_model.interface.codec.message import Interface, Message, MessageKind
 from cubestack.host.clients.contract import DeviceClient
 from cubestack.host.devices.device import AnyDevice, Device
-from cubestack.host.devices.lazily import call, get, load
+from cubestack.host.devices.registry import call, get, load
 
 
 def node_device(

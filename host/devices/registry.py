@@ -1,19 +1,44 @@
 """All registered devices by name: built-in ones and those of other distributions.
 
 Another distribution registers a device by an entry point in the group ``cubestack.devices``: its
-name is the device's, its value leads to a ``Device``.
+name is the device's, its value leads to a ``Device``. Texts ``"package.module:name"`` name what is
+imported on first use.
 """
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
-from functools import cache
+from functools import cache, partial
 from importlib.metadata import EntryPoint, entry_points
-from typing import TypeVar
+from pkgutil import resolve_name
+from typing import Any, TypeVar
 
-from cubestack.firmware_model.interface.checks import check_address, check_interface
+from cubestack.firmware_model.interface.checks import check_address, check_interface, place_of
 from cubestack.host.devices.device import AnyDevice, Device
-from cubestack.host.devices.lazily import load
 from cubestack.host.errors import TargetError
+
+
+def load(what: str) -> Any:
+    """Load it; on failure, raises TargetError with file and line."""
+    try:
+        return resolve_name(what)
+    except Exception as error:
+        place = place_of(error.__traceback__, what.split(".")[0].split(":")[0])
+        kind = "" if isinstance(error, ValueError | ImportError) else f"{type(error).__name__}: "
+        raise TargetError(f"{what} does not load: {place}{kind}{error}") from error
+
+
+def get(what: str) -> Callable[[], Any]:
+    return partial(load, what)
+
+
+def call(what: str, *first: Any, **always: Any) -> Callable[..., Any]:
+    """A callable that passes these arguments, then its own, to the named function."""
+
+    def called(*given: Any, **options: Any) -> Any:
+        return load(what)(*first, *given, **always, **options)
+
+    return called
+
 
 V = TypeVar("V")
 

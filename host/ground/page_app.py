@@ -23,8 +23,7 @@ from cubestack.host.ground import relays
 from cubestack.host.ground.emulation import JsonObject
 from cubestack.host.ground.emulators import UploadedFile
 from cubestack.host.ground.guard import refusal, refused
-from cubestack.host.ground.logs import recording, results_table, transcript_table
-from cubestack.host.ground.relays import forward
+from cubestack.host.ground.relays import forward, recording, results_table, transcript_table
 from cubestack.host.ground.session import TargetSession
 
 PAGE = Path(__file__).parent / "page"

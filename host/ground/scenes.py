@@ -14,7 +14,7 @@ from cubestack.firmware_model.formats.setup import Document
 from cubestack.host.devices.device import AnyDevice
 from cubestack.host.emulation.emulated import AnyEmulated
 from cubestack.host.errors import TargetError
-from cubestack.host.pictures.star_names import is_named, star_name
+from cubestack.host.pictures.overlay import is_named, star_name
 from cubestack.host.recording.setups import written
 
 JsonObject = dict[str, Any]

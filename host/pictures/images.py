@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from cubestack.host.clients.contract import FoundStar
+from cubestack.host.pictures.overlay import star_name
 from cubestack.host.pictures.sheet import GRID, TRUTH, Entry, Lens, Sheet
-from cubestack.host.pictures.star_names import star_name
 
 FEWEST_COUNTS = 24
 """Range of grey values that is stretched to the whole, at least: noise is not made a picture."""

@@ -8,7 +8,7 @@ from cubestack.firmware_model.interface.aramis import IMAGE_BYTES, INTERFACE
 from cubestack.firmware_model.interface.cameras.mt9m001 import REGISTERS
 from cubestack.host.conformance import effects
 from cubestack.host.devices.device import ConformanceNotes, Device, Engine, Report
-from cubestack.host.devices.lazily import call, get
+from cubestack.host.devices.registry import call, get
 
 if TYPE_CHECKING:
     from cubestack.emulator.boards.aramis.board import AramisBoard

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 from cubestack.firmware_model.interface.cubesense import INTERFACE
 from cubestack.host.devices.device import BoardOption, ConformanceNotes, Device, Report
-from cubestack.host.devices.lazily import call, get
+from cubestack.host.devices.registry import call, get
 
 if TYPE_CHECKING:
     from cubestack.emulator.boards.cubesense.board import CubeSenseBoard

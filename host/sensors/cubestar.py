@@ -10,7 +10,7 @@ from cubestack.firmware_model.interface.cubestar.pins import Layout
 from cubestack.firmware_model.interface.cubestar.switches import DEFAULT_SWITCHES, CubeStarSwitches
 from cubestack.host.conformance import effects
 from cubestack.host.devices.device import FILE, BoardOption, ConformanceNotes, Device, Report
-from cubestack.host.devices.lazily import call, get
+from cubestack.host.devices.registry import call, get
 
 if TYPE_CHECKING:
     from cubestack.emulator.boards.cubestar.firmware import CubeStarFirmwareBoard

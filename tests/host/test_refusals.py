@@ -27,7 +27,7 @@ from cubestack.host.studies import workers
 from cubestack.host.studies.campaign.plan import CampaignPlan
 from cubestack.host.studies.fidelity import table as fidelity
 from cubestack.host.studies.fidelity.table import fidelity_of
-from cubestack.host.studies.hazards import album
+from cubestack.host.studies.hazards import command as hazards
 from cubestack.host.studies.upsets import experiment as upsets
 from cubestack.host.studies.upsets.clean import Interval
 from cubestack.host.targets import Target, connect, open_target
@@ -192,9 +192,9 @@ def test_missing_packages_name_their_extra(monkeypatch: pytest.MonkeyPatch, tmp_
         save_curves({}, "", "", lambda _count, _of: (0, 1), tmp_path / "x.png")
     with pytest.raises(ValueError, match="needs distributed: pip install distributed"):
         workers._cluster("tcp://x").__enter__()
-    monkeypatch.setattr(album, "find_spec", lambda _name: None)
+    monkeypatch.setattr(hazards, "find_spec", lambda _name: None)
     with pytest.raises(ValueError, match="--out: figures need matplotlib"):
-        album.check(tmp_path)
+        hazards.check_page(tmp_path)
 
 
 @pytest.mark.parametrize(("threads", "told"), [({}, "has no workers"), ({"a": 2, "b": 3}, "")])

@@ -1,1 +1,0 @@
-"""AraMiS' client."""

@@ -1,1 +1,0 @@
-"""CubeSense's client."""

@@ -1,1 +1,0 @@
-"""CubeStar's client and operator procedures."""

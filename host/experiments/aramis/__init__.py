@@ -1,1 +1,0 @@
-"""Experiments with the star tracker of AraMiS."""

@@ -35,8 +35,8 @@ from cubestack.host.studies.campaign.folder import (
 )
 from cubestack.host.studies.campaign.folder import run as run_into
 from cubestack.host.studies.campaign.plan import CampaignPlan, known_plans, plan_file, summary
+from cubestack.host.studies.campaign.report import worst
 from cubestack.host.studies.campaign.statistics import Change, compared
-from cubestack.host.studies.campaign.worst import worst
 from cubestack.host.studies.workers import cores
 from cubestack.host.terminal import progress, say, show
 

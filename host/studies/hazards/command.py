@@ -13,15 +13,29 @@ examples:
 
 import argparse
 import json
+from collections.abc import Sequence
+from importlib.util import find_spec
+from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
 from rich.table import Table
 
 from cubestack.firmware_model.interface.codec.switches import PROFILES
 from cubestack.firmware_model.values import whole
 from cubestack.host.cli.arguments import add_flag, add_path, add_value
-from cubestack.host.experiments.hazard_options import known
+from cubestack.host.devices.registry import device as registered
+from cubestack.host.emulation.emulated import AnyEmulated
+from cubestack.host.errors import install_command
+from cubestack.host.experiments.hazard_options import Asked, known
+from cubestack.host.experiments.measure import experiment_of
+from cubestack.host.experiments.opener import Opener
 from cubestack.host.experiments.rates import wilson
-from cubestack.host.studies.hazards import album, curves
+from cubestack.host.experiments.scene_truth import cameras_of
+from cubestack.host.pictures.figures import save_curves
+from cubestack.host.pictures.images import save_sample
+from cubestack.host.studies.hazards import curves
+from cubestack.host.studies.hazards.curves import Point
 from cubestack.host.studies.workers import cores
 from cubestack.host.terminal import progress, say, show
 
@@ -60,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
         for job in curves.jobs_of(name, args.hazard, args.frames, args.seed, args.profile)
     ]
     if args.out:
-        album.check(args.out)
+        check_page(args.out)
     workers = min(args.workers or cores(), len(jobs))
     points = []
     for point in progress(curves.run(jobs, workers), len(jobs), "measuring", quiet=args.json):
@@ -70,7 +84,7 @@ def run(args: argparse.Namespace) -> int:
     if not args.json:
         _show(points)
     if args.out:
-        written = album.write(points, args.out, args.seed)
+        written = write_page(points, args.out, args.seed)
         say(f"wrote {written} files to {args.out}")
     return 0
 
@@ -100,3 +114,110 @@ def _show(points: list[curves.Point]) -> None:
             *(point.device, point.hazard, strength, right, str(point.refused), wrong, reasons)
         )
     show(table)
+
+
+PROFILE = "extended"
+PAGE = "hazards.md"
+PICTURES = Path("images") / "hazards"
+BEGIN, END = "<!-- hazards -->\n", "<!-- end of hazards -->\n"
+TITLE = f"# Hard skies\n\n{BEGIN}{END}"
+
+
+def check_page(folder: Path) -> None:
+    """Create the folder; raises ValueError if it, its figures or its page cannot be written."""
+    if find_spec("matplotlib") is None:
+        raise ValueError(f"--out: figures need matplotlib: {install_command('plots')}")
+    try:
+        (folder / PICTURES).mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError):
+        raise ValueError(f"--out: {folder} is a file; a folder would be right") from None
+    _page(folder)
+
+
+def write_page(points: Sequence[Point], folder: Path, seed: int) -> int:
+    """Write images, curves, points and the page; returns the number of files."""
+    pictures = folder / PICTURES
+    lines = [json.dumps(point.as_dict()) for point in points]
+    (pictures / "points.jsonl").write_text("\n".join(lines) + "\n", "utf-8")
+    names = dict.fromkeys(point.hazard for point in points)
+    for name in names:
+        own = [point for point in points if point.hazard == name]
+        save_curves(
+            {registered(device).title: of for device, of in _by_device(own).items()},
+            _axis(name),
+            known()[name].meaning,
+            wilson,
+            pictures / f"{name}-curve.png",
+        )
+        for device in _by_device(own):
+            save_sample(sample(device, name, seed), pictures / f"{name}-{device}.jpg")
+    before, after = _page(folder)
+    sections = [_section(name, [p for p in points if p.hazard == name]) for name in sorted(names)]
+    (folder / PAGE).write_text(before + BEGIN + "\n".join(sections) + END + after, "utf-8")
+    return 2 + len(names) + len({(point.hazard, point.device) for point in points})
+
+
+def _page(folder: Path) -> tuple[str, str]:
+    """The page's text before and after the hazards; raises ValueError without the markers."""
+    path = folder / PAGE
+    page = path.read_text("utf-8") if path.is_file() else TITLE
+    if BEGIN not in page or END not in page:
+        raise ValueError(f"--out: {path} has no lines {BEGIN.strip()} and {END.strip()}")
+    return page.split(BEGIN)[0], page.split(END, 1)[1]
+
+
+def _by_device(points: Sequence[Point]) -> dict[str, list[Point]]:
+    found: dict[str, list[Point]] = {}
+    for point in points:
+        found.setdefault(point.device, []).append(point)
+    return found
+
+
+def _axis(name: str) -> str:
+    scale = known()[name].strength
+    return f"{scale.key}, {scale.unit}" if scale.unit else scale.key
+
+
+def _section(name: str, points: Sequence[Point]) -> str:
+    """A section of the page: the hazard, an image per device, the curve and the numbers."""
+    kind = known()[name]
+    usual, where = f"{kind.strength.usual:g}", "/".join(kind.__module__.split(".")[1:])
+    lines = [
+        f"## {name}",
+        "",
+        f"{kind.meaning[0].upper()}{kind.meaning[1:]}: `--hazard {name}`, which is "
+        f"`{name}={usual}`. Source: `{where}.py`.",
+        "",
+    ]
+    for device in _by_device(points):
+        title = f"{registered(device).title}, {_axis(name)} {usual}"
+        lines += [f"![{title}]({PICTURES.as_posix()}/{name}-{device}.jpg)", ""]
+    lines += [f"![right, refused and wrong]({PICTURES.as_posix()}/{name}-curve.png)", ""]
+    lines += [f"| | {_axis(name)} | right | refused | wrong |", "|-|-|-|-|-|"]
+    for device, own in _by_device(points).items():
+        for point in own:
+            reasons = ", ".join(f"{count} {reason}" for reason, count in point.reasons.items())
+            refused = f"{point.refused} ({reasons})" if reasons else f"{point.refused}"
+            lines.append(
+                f"| {registered(device).title} | {point.strength:g} | {point.right} of "
+                f"{point.pictures} | {refused} | {point.wrong} |"
+            )
+    return "\n".join(lines) + "\n"
+
+
+def sample(device: str, hazard: str, seed: int) -> NDArray[np.uint8]:
+    """The image (rows, columns) of a device's first frame with a hazard of its usual strength;
+    several cameras side by side.
+    """
+    found, kept = registered(device), list[AnyEmulated]()
+    options = experiment_of(found).options(hazard=(Asked(hazard),), seed=seed)
+    opener = Opener(found, board={"profile": PROFILE}, opened=kept.append)
+    pictures: list[NDArray[np.uint8]] = []
+    results = experiment_of(found).run(opener, options)
+    # Each result is the next camera's; the rendered image equals a download.
+    for _ in results:
+        cameras = list(cameras_of(kept[0].board))
+        pictures.append(cameras[len(pictures)].rendered)
+        if len(pictures) == len(cameras):
+            break
+    return np.hstack(pictures)

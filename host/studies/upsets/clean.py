@@ -12,8 +12,14 @@ from numpy.typing import NDArray
 from cubestack.emulator.faults.sites import Sites
 from cubestack.emulator.rtl.contract import RtlEngine
 from cubestack.host.emulation.emulated import AnyEmulated
-from cubestack.host.studies.upsets.subject import BETWEEN, IDLE, STORING, Subject, UpsetVerdict
-from cubestack.host.studies.upsets.watch import PortWatch
+from cubestack.host.studies.upsets.subject import (
+    BETWEEN,
+    IDLE,
+    STORING,
+    PortWatch,
+    Subject,
+    UpsetVerdict,
+)
 
 PS_PER_S = 10**12
 

@@ -11,8 +11,7 @@ from cubestack.host.devices.experiment import Result
 from cubestack.host.emulation.emulated import AnyEmulated
 from cubestack.host.errors import HostError
 from cubestack.host.studies.upsets.clean import CleanLoop, Snapshot, take
-from cubestack.host.studies.upsets.subject import Answer, Subject, UpsetVerdict
-from cubestack.host.studies.upsets.watch import PortWatch
+from cubestack.host.studies.upsets.subject import Answer, PortWatch, Subject, UpsetVerdict
 
 AHEAD_PS = 2_000_000
 """Lead time of a copy before its upset: no processor step takes the FPGAs past it."""

@@ -15,10 +15,9 @@ from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
 from cubestack.firmware_model.interface.cubestar import ResetCause
 from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitches
 from cubestack.host.clients.node import NodeClient
-from cubestack.host.conformance.contract import CheckResult, CheckRun, Verdict
+from cubestack.host.conformance.contract import CheckResult, CheckRun, Verdict, values_to_try
 from cubestack.host.conformance.effects import check_stream
 from cubestack.host.conformance.suite import check_reads, compare
-from cubestack.host.conformance.values import values_to_try
 from cubestack.host.conformance.writes import check_writes
 from cubestack.host.devices.registry import device
 from cubestack.host.devices.shown_settings import read_back

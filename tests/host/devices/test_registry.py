@@ -10,8 +10,7 @@ import pytest
 from cubestack.emulator.scene.attitude import matrix_from_quaternion
 from cubestack.emulator.scene.earth_sun import CameraTarget
 from cubestack.host.devices import registry
-from cubestack.host.devices.lazily import get
-from cubestack.host.devices.registry import device, device_names, devices, merged_tables
+from cubestack.host.devices.registry import device, device_names, devices, get, merged_tables
 from cubestack.host.emulation.emulated import open_device
 from cubestack.host.errors import TargetError
 

@@ -6,8 +6,8 @@ from cubestack.firmware_model.formats.recording import load_recording
 from cubestack.firmware_model.interface.cubesense import INTERFACE
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.errors import NoAnswerError, TargetError
-from cubestack.host.ground.logs import recording
 from cubestack.host.ground.playback import PlaybackClient, is_recording, open_recording
+from cubestack.host.ground.relays import recording
 from cubestack.host.ground.session import TargetSession
 from cubestack.host.targets import Target, open_target
 

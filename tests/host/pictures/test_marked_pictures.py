@@ -31,8 +31,8 @@ from cubestack.host.pictures.images import (
     stretched,
     widest_deg,
 )
+from cubestack.host.pictures.overlay import _NAMES, star_name
 from cubestack.host.pictures.sheet import GRID, TRUTH, Colour
-from cubestack.host.pictures.star_names import _NAMES, star_name
 from tests.host.pictures.conftest import Text
 from tests.host.pictures.test_images import CAMERA, SHAPE, Found
 

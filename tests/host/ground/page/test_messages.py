@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import pytest
 
 from cubestack.firmware_model.interface.codec.message import Interface, Message
-from cubestack.host.conformance.values import values_to_try
+from cubestack.host.conformance.contract import values_to_try
 from cubestack.host.devices.registry import BUILT_IN, device
 from tests.examples.conftest import ROOT, installed
 

@@ -16,8 +16,8 @@ from cubestack.host.studies.campaign import report
 from cubestack.host.studies.campaign.block import Row
 from cubestack.host.studies.campaign.folder import Folder, FolderError, run
 from cubestack.host.studies.campaign.plan import CampaignPlan
+from cubestack.host.studies.campaign.report import worst
 from cubestack.host.studies.campaign.statistics import by_chance, compared, errors, rates
-from cubestack.host.studies.campaign.worst import worst
 
 Make = Callable[..., Folder]
 FRAMES = 120
@@ -225,7 +225,7 @@ def test_worst_case_has_the_largest_error(
         for row, error in zip(run(folder, 1), (0.5, -3.0, None, 1.0, 2.0), strict=False)
     ]
     monkeypatch.setattr(Folder, "rows", lambda _folder: iter(rows))
-    monkeypatch.setattr("cubestack.host.studies.campaign.worst._picture", lambda *_of: b"")
+    monkeypatch.setattr("cubestack.host.studies.campaign.report._picture", lambda *_of: b"")
     cases = list(worst(folder, 4))
     assert [case.number for case in cases] == [1, 4, 3, 0]
     assert "error_deg 3" in cases[0].text

@@ -9,7 +9,7 @@ from scipy.stats import binomtest
 from cubestack.host.devices.registry import device
 from cubestack.host.experiments.hazard_options import known
 from cubestack.host.experiments.rates import wilson
-from cubestack.host.studies.hazards.album import PAGE, PICTURES
+from cubestack.host.studies.hazards.command import PAGE, PICTURES
 from cubestack.host.studies.hazards.curves import Job, devices_with_hazards, hazards_of
 from cubestack.host.studies.hazards.curves import run as run_jobs
 from tests.conftest import Run

@@ -25,8 +25,7 @@ from cubestack.host.studies.upsets.sample import (
     effect_of,
     followed,
 )
-from cubestack.host.studies.upsets.subject import Answer, Subject, UpsetVerdict
-from cubestack.host.studies.upsets.watch import PortWatch
+from cubestack.host.studies.upsets.subject import Answer, PortWatch, Subject, UpsetVerdict
 
 ROW = 16
 CLEAN = Snapshot(
