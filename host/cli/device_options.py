@@ -172,19 +172,24 @@ def record(
     return recorder
 
 
-def add_target_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("target", metavar="TARGET", help=FORMS)
+def add_line_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare which device a target is, and its lines and control port."""
     parser.add_argument(
         "--device", choices=device_names(), help="needed if TARGET does not name it"
     )
     parser.add_argument("--bench", metavar="TARGET", help="serial line with the bench protocol")
-    add_flag(parser, "--backup", "the serial line speaks the register protocol")
     add_value(parser, "baud", whole(None, "baud rate of the serial line", 1))
-    add_path(parser, "--scene", "for an emulated device")
-    add_value(parser, "seed", whole(0, "for an emulated device", 0))
     parser.add_argument(
         "--control", metavar="URL", help=f"control port of the emulation; its token is in ${TOKEN}"
     )
+
+
+def add_target_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("target", metavar="TARGET", help=FORMS)
+    add_line_arguments(parser)
+    add_flag(parser, "--backup", "the serial line speaks the register protocol")
+    add_path(parser, "--scene", "for an emulated device")
+    add_value(parser, "seed", whole(0, "for an emulated device", 0))
     add_board_arguments(parser)
     add_path(parser, "--record", "record the session to FILE")
 

@@ -23,10 +23,9 @@ from typing import TYPE_CHECKING, Any
 
 from cubestack.firmware_model.values import whole
 from cubestack.host.cli.arguments import add_flag, add_path, add_value
-from cubestack.host.cli.device_options import add_board_arguments, given_options
+from cubestack.host.cli.device_options import add_board_arguments, add_line_arguments, given_options
 from cubestack.host.cli.ports import LAST_PORT
 from cubestack.host.devices.registry import device_names
-from cubestack.host.emulation.remote_controls import TOKEN
 from cubestack.host.errors import TargetError
 from cubestack.host.targets import EMULATED, FORMS, open_target
 from cubestack.host.terminal import say
@@ -41,14 +40,7 @@ LOOK_S = 0.5
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("targets", nargs="+", metavar="TARGET", help=FORMS)
-    parser.add_argument(
-        "--device", choices=device_names(), help="needed if TARGET does not name it"
-    )
-    add_value(parser, "baud", whole(None, "baud rate of the serial line", 1))
-    parser.add_argument("--bench", metavar="TARGET", help="serial line with the bench protocol")
-    parser.add_argument(
-        "--control", metavar="URL", help=f"control port of the emulation; its token is in ${TOKEN}"
-    )
+    add_line_arguments(parser)
     add_path(parser, "--record", "record the session with a device that is not emulated here")
     parser.add_argument("--scene", metavar="FILE", help="for an emulated device")
     add_value(parser, "seed", whole(None, "for an emulated device", 0))

@@ -26,6 +26,10 @@ from cubestack.host.errors import (
     TargetError,
 )
 
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
 
 @dataclass
 class Exchanges:
@@ -47,10 +51,6 @@ class Exchanges:
         names = [one.name for one in fields(self)]
         return Exchanges(*(getattr(self, name) + getattr(other, name) for name in names))
 
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 #: Called with (blocks done, total) during a transfer.
 Progress = Callable[[int, int], None]

@@ -216,6 +216,7 @@ def test_nadir_is_marked_and_captioned(tmp_path: Path, written: list[Text]) -> N
         *written
     }
     assert "limb fitted" not in written
+    assert len(ink(image, FITTED, 960)) < 150
     sizes = [np.ptp(ink(image, colour, 960), axis=0).max() / 2 for colour in (EDGE, FITTED, TRUTH)]
     assert sizes == sorted(sizes)
     assert 3 < sizes[0] < sizes[2] < 40
@@ -307,6 +308,8 @@ def test_enlarged_window_marks_found_and_true_sun(tmp_path: Path) -> None:
     for colour, place in ((FITTED, found), (TRUTH, true)):
         marks = ink(image, colour, 960)
         far = np.abs(marks / 2 - found).max(axis=1) > 60
+        near = (marks[~far].min(axis=0) + marks[~far].max(axis=0)) / 4 - 0.25
+        assert near == pytest.approx(place, abs=1)
         edge = ink(image, EDGE, 960)
         corner = edge[np.abs(edge / 2 - found).max(axis=1) > 60].min(axis=0)
         offset = place - (np.array(FULL_SIZE.window_origin(*first)) - 0.5)

@@ -8,7 +8,7 @@ from cubestack.firmware_model.interface.cubesense import INTERFACE
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.emulation.controls import EmulatedControls
 from cubestack.host.shell.language import Shell, ShellError
-from cubestack.host.shell.names import check_count, to_number
+from cubestack.host.shell.names import CommandResult, check_count, to_number
 from cubestack.host.targets import Target
 
 from ..conftest import LetterLine, UartLink
@@ -36,6 +36,11 @@ class Known:
         )
         self.shell = Shell(self.target)
 
+    def run(self, line: str) -> CommandResult:
+        result = self.shell.execute(line)
+        assert result is not None
+        return result
+
 
 @pytest.fixture
 def known(sense: Any) -> Known:
@@ -53,96 +58,87 @@ def known(sense: Any) -> Known:
 def test_wrong_number_of_words_prints_the_usage(known: Known, line: str) -> None:
     name, *words = line.split()
     with pytest.raises(ShellError, match=f"^{name}: {len(words)} words; usage: {name}"):
-        known.shell.execute(line)
+        known.run(line)
     assert known.line.silences == known.letters.silences == []
 
 
 @pytest.mark.parametrize("line", ["power SRAM1", "power SRAM1 on off", "power SRAM1 maybe"])
 def test_power_rejects_other_words(known: Known, line: str) -> None:
     with pytest.raises(ShellError, match=r"usage: power \[CHANNEL on\|off\]"):
-        known.shell.execute(line)
+        known.run(line)
     known.controls.switch.assert_not_called()
 
 
 @pytest.mark.parametrize(("word", "on"), [("on", True), ("off", False)])
 def test_power_shows_the_currents(known: Known, word: str, on: bool) -> None:
-    found = known.shell.execute(f"power SRAM1 {word}")
+    found = known.run(f"power SRAM1 {word}")
     known.controls.switch.assert_called_once_with("SRAM1", on)
-    assert found is not None
     assert found.rows == [("total", "71.9 mA"), ("SRAM1", "0.2 mA")]
     assert found.data == {"currents_ma": {"total": 71.94, "SRAM1": 0.25}}
-    assert known.shell.execute("power") == found
+    assert known.run("power") == found
 
 
 def test_time_advances_and_is_shown(known: Known) -> None:
-    found = known.shell.execute("time 0.25")
+    found = known.run("time 0.25")
     known.controls.advance.assert_called_once_with(0.25)
-    assert found is not None
     assert (found.rows, found.data) == ([("time", "1.500000 s")], {"time_s": 1.5})
-    assert known.shell.execute("time") == found
+    assert known.run("time") == found
     known.controls.advance.assert_called_once_with(0.25)
     with pytest.raises(ShellError, match="time: must be 0 to 1000000000, not -1"):
-        known.shell.execute("time -1")
+        known.run("time -1")
 
 
 def test_scene_and_faults(known: Known) -> None:
-    assert known.shell.execute("scene a.toml").data == {"scene": "a.toml"}  # type: ignore[union-attr]
+    assert known.run("scene a.toml").data == {"scene": "a.toml"}
     known.controls.scene.assert_called_once_with(Path("a.toml"))
-    listed = known.shell.execute("fault")
-    assert listed is not None
+    listed = known.run("fault")
     assert (listed.rows, listed.data) == ([("", "latch-up SRAM1")], {"faults": ("latch-up SRAM1",)})
-    log = known.shell.execute("fault log")
-    assert log is not None
+    log = known.run("fault log")
     assert log.rows == [("", "0.1 s latch-up SRAM1")]
     known.controls.fault.assert_not_called()
-    done = known.shell.execute("fault latch-up SRAM1 for_s=2")
+    done = known.run("fault latch-up SRAM1 for_s=2")
     known.controls.fault.assert_called_once_with(["latch-up", "SRAM1", "for_s=2"])
-    assert done is not None
     assert done.data == {"fault": "latch-up SRAM1 for_s=2"}
 
 
 def test_peek(known: Known) -> None:
-    found = known.shell.execute("peek TIMER0")
+    found = known.run("peek TIMER0")
     known.controls.peek.assert_called_once_with("TIMER0")
-    assert found is not None
     assert found.rows == [("TIMER0.CNT", "0x7"), ("x", "not there")]
     assert found.data == {"values": {"TIMER0.CNT": 7, "x": None}}
 
 
 def test_raw_waits_briefly_for_more_bytes(known: Known) -> None:
-    found = known.shell.execute("raw 1f7f 80 1fff")
-    assert found is not None
+    found = known.run("raw 1f7f 80 1fff")
     assert found.data["answer"].startswith("1f7f")
     assert found.rows == [("", bytes.fromhex(found.data["answer"]).hex(" "))]
     (waited_s,) = known.line.silences
     assert 0.1 <= waited_s <= 0.5
-    assert known.shell.execute("raw 00").rows == [("", "(nothing)")]  # type: ignore[union-attr]
+    assert known.run("raw 00").rows == [("", "(nothing)")]
     with pytest.raises(ShellError, match="usage: raw HEX"):
-        known.shell.execute("raw")
+        known.run("raw")
     with pytest.raises(ShellError, match="'1 2 3' is not hexadecimal bytes"):
-        known.shell.execute("raw 1 2 3")
+        known.run("raw 1 2 3")
 
 
 def test_bench_shows_short_answers_and_counts_long_ones(known: Known) -> None:
     assert INTERFACE.service_port is not None
     for letter in INTERFACE.service_port.letters:
         known.letters.answers[letter.letter] = b"x" * letter.length
-        found = known.shell.execute(f"bench {letter.letter}")
-        assert found is not None
+        found = known.run(f"bench {letter.letter}")
         short = letter.length <= 8
         text = repr("x" * letter.length) if short else f"{letter.length} bytes"
         assert found.rows == [(letter.name, text)]
         assert found.data == {"letter": letter.letter, "answer": (b"x" * letter.length).hex()}
         known.letters.answers[letter.letter] = b"x" * (letter.length - 1)
-        cut = known.shell.execute(f"bench {letter.letter}")
-        assert cut is not None
+        cut = known.run(f"bench {letter.letter}")
         assert cut.rows == [(letter.name, f"{letter.length - 1} bytes of {letter.length}")]
 
 
 @pytest.mark.parametrize("word", ["é", "qq", "€"])
 def test_bench_rejects_unknown_letters(known: Known, word: str) -> None:
     with pytest.raises(ShellError, match=f"no letter '{word}'; known: "):
-        known.shell.execute(f"bench {word}")
+        known.run(f"bench {word}")
 
 
 @pytest.mark.parametrize(
@@ -153,8 +149,7 @@ def test_watch_repeats_with_its_interval(known: Known, words: str, pauses: list[
     node: Any = known.target.node
     node.pause = waited.append
     known.shell.on_row = shown.append
-    found = known.shell.execute(f"watch Identification{words}")
-    assert found is not None
+    found = known.run(f"watch Identification{words}")
     assert waited == pauses
     assert len(found.data["readings"]) == len(shown) == len(pauses) + 1
 
