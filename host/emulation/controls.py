@@ -53,7 +53,7 @@ def spoken(kinds: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
 
 
 class EmulatedControls:
-    """Faults, scene, load switches and time of a device emulated in this process.
+    """``Controls`` of a device emulated in this process.
 
     Attributes:
         on_act: called after each action with the shell's words and the text of the file they name.
@@ -92,7 +92,6 @@ class EmulatedControls:
                 raise TargetError(f"nothing does {' '.join(control.words)!r}")
 
     def fault(self, words: list[str]) -> None:
-        """Inject a fault; raises ValueError unless it is in ``faults``."""
         if words == [CLEAR]:
             self._board.faults.clear()
         else:
@@ -100,11 +99,9 @@ class EmulatedControls:
         self.on_act(("fault", *words), "")
 
     def fault_log(self) -> list[str]:
-        """The fault events, a line each with its virtual time."""
         return [str(event) for event in self._board.faults.log]
 
     def scene(self, path: Path) -> None:
-        """Load a scene file; raises ValueError if it is invalid."""
         try:
             self._emulated.scene = path
         except FileNotFoundError:
@@ -124,10 +121,6 @@ class EmulatedControls:
         self.on_act(("power", channel, "on" if on else "off"), "")
 
     def peek(self, what: str) -> dict[str, tuple[int | None, str]]:
-        """Memory words of the processor that runs the user's firmware, each with a text, by name.
-
-        Raises ValueError for an unknown name.
-        """
         from cubestack.emulator.boards.monitor import peek
 
         insight = self._board.insight
