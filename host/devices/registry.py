@@ -60,6 +60,7 @@ def _entries() -> dict[str, EntryPoint]:
 
 
 def device_names() -> tuple[str, ...]:
+    """Names of all registered devices; loads none of them."""
     return tuple(_entries())
 
 
