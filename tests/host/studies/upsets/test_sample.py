@@ -14,7 +14,7 @@ from cubestack.host.devices.registry import device
 from cubestack.host.experiments.measure import experiment_of
 from cubestack.host.studies.upsets.atlas import HEAD, atlas, lines, rows
 from cubestack.host.studies.upsets.clean import CleanLoop, Interval, Snapshot, take
-from cubestack.host.studies.upsets.fork import CopyError, in_copy
+from cubestack.host.studies.upsets.experiment import CopyError, in_copy
 from cubestack.host.studies.upsets.sample import (
     Effect,
     Outcome,
