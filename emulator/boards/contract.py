@@ -17,7 +17,7 @@ from cubestack.emulator.faults.sites import Sites
 from cubestack.emulator.i2cdev.direct import DirectI2c
 from cubestack.emulator.ports.line import DirectSerial
 from cubestack.emulator.rtl.contract import RtlEngine
-from cubestack.emulator.sim.microcontroller import Microcontroller
+from cubestack.emulator.sim.fpga_port import Microcontroller
 from cubestack.emulator.sim.power import PowerModel, PowerTable
 from cubestack.emulator.sim.processor import Program
 from cubestack.emulator.sim.virtual_time import Kernel

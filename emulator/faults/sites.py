@@ -12,7 +12,7 @@ from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.faults.declaration import Site
 from cubestack.emulator.rtl.contract import RtlEngine
 from cubestack.emulator.rtl.pixel_clock import PixelSource
-from cubestack.emulator.sim.microcontroller import Microcontroller
+from cubestack.emulator.sim.fpga_port import Microcontroller
 from cubestack.emulator.sim.power import PowerModel
 from cubestack.emulator.sim.virtual_time import Kernel
 

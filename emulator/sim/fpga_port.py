@@ -1,4 +1,6 @@
-"""A microcontroller's connection to an FPGA: lines, a data clock, an external bus.
+"""A microcontroller's connection to an FPGA, and its interface to boards, faults and hosts.
+
+The connection has lines, a data clock, an external bus.
 
 A transaction on the bus has the phases of :mod:`cubestack.firmware_model.mcu.external_bus`.
 """
@@ -138,3 +140,34 @@ class FpgaPort(Protocol):
         transactions that end by ``until_ps`` run. Returns their number n; ``now_ps`` advances by
         floor(n * period). ValueError for a design without that bus.
         """
+
+
+class Microcontroller(Protocol):
+    """A processor in virtual time.
+
+    Attributes:
+        fpga: the FPGA at its pins, or a fault in front of it; None on a board without.
+        resets: number of resets since power-up.
+        waiting: nothing happens without input from outside.
+        dozing: it sleeps, with or without a deadline.
+    """
+
+    resets: int
+
+    @property
+    def fpga(self) -> FpgaPort | None: ...
+
+    @fpga.setter
+    def fpga(self, fpga: FpgaPort | None) -> None: ...
+
+    @property
+    def waiting(self) -> bool: ...
+
+    @property
+    def dozing(self) -> bool: ...
+
+    def wake(self) -> None:
+        """An interrupt is pending: if it sleeps, it wakes."""
+
+    def reset(self, cause: int, hang_us: int = 0) -> None:
+        """Reset with ``cause``, after the program has hung for ``hang_us``."""

@@ -35,8 +35,7 @@ from cubestack.emulator.camera.common.scene_file import hazard_tables, split_haz
 from cubestack.emulator.camera.ov7620.fisheye import check_field
 from cubestack.emulator.camera.ov7620.lens_error import LensError
 from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
-from cubestack.emulator.scene.ball import BALL, ball_scene
-from cubestack.emulator.scene.earth_sun import EarthSunScene, Mounting, Reflection
+from cubestack.emulator.scene.earth_sun import BALL, EarthSunScene, Mounting, Reflection, ball_scene
 from cubestack.emulator.scene.file import SceneError, read_scene_file, values_for
 from cubestack.emulator.scene.hazards import EARTH_HAZARDS, SKY_HAZARDS
 from cubestack.firmware_model import values as declare

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
-from cubestack.emulator.scene.ball import ball_scene
+from cubestack.emulator.scene.earth_sun import ball_scene
 from cubestack.firmware_model.interface.cubesense.codes import Camera
 from cubestack.firmware_model.values import number, whole
 from cubestack.host.devices.experiment import Experiment, Result

@@ -8,13 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.emulator.boards.cubestar.catalogue import onboard_catalogue
-from cubestack.emulator.boards.cubestar.compiled import operations
 from cubestack.emulator.boards.cubestar.compiled.build import (
     Build,
     compile_program,
     compiler_version,
 )
-from cubestack.emulator.boards.cubestar.compiled.machine import Timing, start_program
+from cubestack.emulator.boards.cubestar.compiled.machine import (
+    Timing,
+    operation_cycles,
+    start_program,
+)
 from cubestack.emulator.boards.cubestar.compiled.picture import default_settings, run, run_model
 from cubestack.emulator.camera.common.image_sensor import StarSensor
 from cubestack.emulator.scene.sky import SkyScene
@@ -97,7 +100,7 @@ def measure(levels: Sequence[str], precisions: Sequence[str]) -> Iterator[CostMe
             images[case.build] = compile_program(case.build, sources)
         calls = start_program(images[case.build], case.timing)
         phases = run(calls, pixels).cycles
-        cycles = operations.measure(calls, double=case.build.precision == "double")
+        cycles = operation_cycles(calls, double=case.build.precision == "double")
         calls.machine.close()
         yield CostMeasurement(str(case.build), str(case.timing), cycles, phases)
 

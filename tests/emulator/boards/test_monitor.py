@@ -1,10 +1,16 @@
+import itertools
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
+from cubestack.emulator.boards.debugging import REGIONS, CameraWindow, windows
 from cubestack.emulator.boards.monitor import Monitor, RegisterValue, peek, peripherals
+from cubestack.emulator.camera.common.register_file import RegisterFile
 from cubestack.emulator.iss.insight.symbols import Symbol, Symbols
+from cubestack.emulator.iss.machine import FLASH_BYTES, RAM_BYTES
+from cubestack.firmware_model.interface.cameras import mlx75412
 from cubestack.firmware_model.interface.efm32gg import LAYOUTS
 
 
@@ -82,3 +88,58 @@ def test_rejects_unknown_addresses_and_names() -> None:
         look("x")
     with pytest.raises(ValueError, match="CMU has no register X; known: CTRL"):
         look("CMU.X")
+
+
+def lengths() -> dict[int, int]:
+    return {region.start: region.length for region in REGIONS}
+
+
+def test_memories_are_as_large_as_the_part_s() -> None:
+    """EFM32GG Reference Manual, figure 5.2: RAM is in the code space too, and bit by bit."""
+    found = lengths()
+    assert found[0] == FLASH_BYTES == 1 << 20
+    assert found[0x1000_0000] == found[0x2000_0000] == RAM_BYTES == 128 * 1024
+    assert found[0x2200_0000] == 32 * RAM_BYTES
+    assert found[0x8000_0000] == 4 * (64 << 20)  # the banks of the external bus
+    assert found[0xE000_0000] == 0x10_0000
+    (flash,) = [region for region in REGIONS if region.kind == "flash"]
+    assert flash.block == 4096
+
+
+def test_each_peripheral_and_information_page_is_in_a_region() -> None:
+    places = [instance.base for layout in LAYOUTS for instance in layout.instances]
+    for place in (*places, 0x0FE0_0000, 0x0FE0_4000, 0x0FE0_8000, 0x0FE0_81FC):
+        assert any(start <= place < start + length for start, length in lengths().items())
+    ends = sorted((region.start, region.start + region.length) for region in REGIONS)
+    assert all(end <= start for (_, end), (start, _) in itertools.pairwise(ends))
+    assert ends[-1][1] <= 1 << 32
+
+
+@pytest.mark.parametrize("count", [None, 1, 2])
+def test_each_fpga_s_memory_and_the_camera_are_beside_them(count: int | None) -> None:
+    registers = RegisterFile(mlx75412.REGISTERS)
+    memories = [np.arange(size, dtype=np.uint8) for size in (200, 100)][: count or 0]
+    engine = SimpleNamespace(memories={str(n): memory for n, memory in enumerate(memories)})
+    board: Any = SimpleNamespace(
+        engine=None if count is None else engine, camera=SimpleNamespace(registers=registers)
+    )
+    found = windows(board)
+    starts = {region.start: (region.kind, region.length) for region in found}
+    expected = {0xC000_0000 + n * 0x0100_0000: ("ram", m.size) for n, m in enumerate(memories)}
+    assert starts == expected | {0xD000_0000: ("rom", 65_536)}
+    for region, window in found.items():
+        if region.kind == "ram":
+            assert window.read(3, 4) == bytes((3, 4, 5, 6))
+            assert window.write(3, b"\x63")
+    assert all(memory[3] == 0x63 for memory in memories)
+
+
+def test_the_camera_s_registers_can_be_read_only() -> None:
+    registers = RegisterFile(mlx75412.REGISTERS)
+    window = CameraWindow(registers)
+    (first, *_) = mlx75412.REGISTERS["EXPOSURE"].addresses
+    registers.store("EXPOSURE", 0x1234)
+    assert window.read(first, 2) == b"\x12\x34"
+    assert not window.write(first, b"\0\0")
+    assert window.read(first, 2) == b"\x12\x34"
+    assert window.read(0xFFFF, 3) == bytes(3)

@@ -1,9 +1,13 @@
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from PIL import Image
 
+from cubestack.emulator.camera.common.image_sensor import StreamSegment
+from cubestack.emulator.scene.file import SceneError
 from cubestack.emulator.scene.sky import PictureScene
 
 
@@ -13,3 +17,27 @@ def striped(tmp_path: Path) -> PictureScene:
     rows = np.repeat(100 + np.arange(512, dtype=np.uint8) // 4, 1024).reshape(512, 1024)
     Image.fromarray(rows).save(tmp_path / "striped.png")
     return PictureScene(tmp_path / "striped.png")
+
+
+def save(folder: Path, text: str) -> Path:
+    path = folder / "scene.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def check_refused(load: Callable[[Path], Any], path: Path, complaint: str) -> None:
+    with pytest.raises(SceneError) as caught:
+        load(path)
+    message = str(caught.value)
+    assert complaint in message
+    assert str(path) in message
+    assert "\n" not in message
+
+
+def segments(camera: Any, start_ps: int, count: int) -> list[StreamSegment]:
+    found = []
+    for _ in range(count):
+        segment = camera.segment_at(start_ps)
+        found.append(segment)
+        start_ps = segment.start_ps + int(segment.clocks * camera.period)
+    return found

@@ -18,7 +18,7 @@ from cubestack.emulator.scene.attitude import matrix_from_pointing
 from cubestack.emulator.scene.file import toml_text
 from cubestack.firmware_model.values import plain
 
-from .files import save
+from .conftest import save
 
 DOCUMENT = Path(__file__).parents[3] / "docs" / "how-to" / "scenes.md"
 EXAMPLES = [

@@ -12,7 +12,7 @@ import pytest
 
 from cubestack.emulator.native import cache, compiler
 from cubestack.emulator.native.compiler import Compiler, NoCompilerError, find_compiler
-from tests.emulator.fake_compiler import make_compiler
+from tests.emulator.conftest import make_compiler
 
 
 @pytest.fixture

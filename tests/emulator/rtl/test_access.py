@@ -28,8 +28,7 @@ from cubestack.hdl.cubestar.double_top import CubeStarDouble
 from cubestack.hdl.cubestar.shared_top import CubeStarShared, CubeStarTwoBoards
 from cubestack.hdl.cubestar.top import CubeStarTop
 
-from .cameras import plain_camera, random_camera
-from .comparison import Step, assert_same, engines
+from .cameras import Step, assert_same, engines, plain_camera, random_camera
 
 COLUMNS, ROWS = 8, 4
 CYCLE = Fraction(10**12, 48_000_000)

@@ -14,8 +14,15 @@ from cubestack.hdl.cubestar.top import CubeStarTop
 from cubestack.hdl.flow.generate import rtlil_text
 from tests.tiers import quick
 
-from .cameras import plain_camera, random_camera
-from .comparison import Step, assert_same, assert_same_outputs, engines, read
+from .cameras import (
+    Step,
+    assert_same,
+    assert_same_outputs,
+    engines,
+    plain_camera,
+    random_camera,
+    read,
+)
 
 SIZES = [(8, 4), (5, 3)]
 

@@ -17,8 +17,7 @@ from cubestack.hdl.cubesense.pair import CubeSensePair
 from cubestack.hdl.cubestar.top import CubeStarTop
 from tests.tiers import quick
 
-from .cameras import ListCamera, plain_camera
-from .comparison import Step, assert_same, assert_same_outputs, engines, read
+from .cameras import ListCamera, Step, assert_same, assert_same_outputs, engines, plain_camera, read
 from .pair_board import SIDES, SIZES, Script, pair_camera, stores
 
 WIRINGS = [cubesense_wiring(CubeSensePair(size)) for size in SIZES]

@@ -17,8 +17,7 @@ from cubestack.emulator.rtl.contract import RtlEngine
 from cubestack.emulator.rtl.cxxrtl.engine import CompiledEngine
 from cubestack.emulator.rtl.sram import SramTiming
 from cubestack.emulator.rtl.wiring import Wiring
-from tests.emulator.rtl.cameras import ListCamera
-from tests.emulator.rtl.comparison import assert_same
+from tests.emulator.rtl.cameras import ListCamera, assert_same
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
 

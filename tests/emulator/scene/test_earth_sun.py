@@ -2,9 +2,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cubestack.emulator.scene.ball import ball_scene
 from cubestack.emulator.scene.earth import angular_radius_deg
-from cubestack.emulator.scene.earth_sun import CameraTarget, EarthSunScene, Mounting
+from cubestack.emulator.scene.earth_sun import CameraTarget, EarthSunScene, Mounting, ball_scene
 from cubestack.emulator.scene.file import SceneError
 
 SUN, NADIR = CameraTarget.SUN, CameraTarget.NADIR

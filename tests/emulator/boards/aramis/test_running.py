@@ -13,7 +13,7 @@ from cubestack.firmware_model.interface.aramis import INTERFACE, MeasurementMode
 from cubestack.host.clients.i2c import I2cClient
 from cubestack.host.errors import CommandRefusedError
 
-from .desk import Desk, scene
+from .conftest import Desk, scene
 
 
 def test_reports_dead_camera(active: Desk) -> None:

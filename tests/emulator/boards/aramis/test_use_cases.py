@@ -13,7 +13,7 @@ from cubestack.firmware_model.interface.aramis import (
     Reason,
 )
 
-from .desk import ORION, Desk
+from .conftest import ORION, Desk
 
 
 def test_activate_measure_deactivate(desk: Desk) -> None:

@@ -20,7 +20,7 @@ from cubestack.emulator.scene.attitude import (
 from cubestack.emulator.scene.hazards import Moon
 from cubestack.emulator.scene.sky import PictureScene, SceneError, SkyScene
 
-from ..files import check_refused, save
+from ..conftest import check_refused, save
 
 EXAMPLES = Path(__file__).parents[4] / "examples/scenes"
 

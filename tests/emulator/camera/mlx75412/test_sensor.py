@@ -13,7 +13,7 @@ from cubestack.emulator.camera.mlx75412.sensor import Mlx75412, exposure_lines, 
 from cubestack.emulator.scene.sky import PictureScene, SkyScene
 from cubestack.firmware_model.interface.cameras import mlx75412 as chip
 
-from ..files import segments
+from ..conftest import segments
 
 MS = 10**9
 LINE_PS = 132_200_000

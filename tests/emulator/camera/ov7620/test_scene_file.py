@@ -11,7 +11,7 @@ from cubestack.emulator.camera.ov7620.view import FisheyeCondition
 from cubestack.emulator.scene.earth_sun import CameraTarget, Reflection
 from cubestack.emulator.scene.hazards import Clouds, Terminator
 
-from ..files import check_refused, save
+from ..conftest import check_refused, save
 
 SUN, NADIR = CameraTarget.SUN, CameraTarget.NADIR
 

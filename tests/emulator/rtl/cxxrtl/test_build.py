@@ -16,7 +16,7 @@ from cubestack.emulator.rtl.factory import make_engine
 from cubestack.emulator.rtl.simulated import SimulatedEngine
 from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.hdl.cubestar.top import CubeStarTop
-from tests.emulator.fake_compiler import make_compiler
+from tests.emulator.conftest import make_compiler
 from tests.tiers import quick
 
 TIMEOUT_S = 300

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from cubestack.emulator.boards.cubestar.catalogue import onboard_catalogue
-from cubestack.emulator.boards.cubestar.compiled import operations, picture
+from cubestack.emulator.boards.cubestar.compiled import picture
 from cubestack.emulator.boards.cubestar.compiled.build import (
     COMPILER,
     Build,
@@ -17,7 +17,11 @@ from cubestack.emulator.boards.cubestar.compiled.build import (
     compiler_version,
     rewrite_source,
 )
-from cubestack.emulator.boards.cubestar.compiled.machine import Timing, start_program
+from cubestack.emulator.boards.cubestar.compiled.machine import (
+    Timing,
+    operation_cycles,
+    start_program,
+)
 from cubestack.emulator.boards.monitor import peek
 from cubestack.emulator.iss.calls import CallError, Calls
 from cubestack.emulator.iss.insight.symbols import Symbols
@@ -68,7 +72,7 @@ def test_operation_costs_match_the_record(fast: Calls) -> None:
     (of_this_build,) = (
         one for one in recorded if (one.build, one.timing) == (str(Build("O2")), str(Timing()))
     )
-    found = operations.measure(fast)
+    found = operation_cycles(fast)
     assert found == pytest.approx(of_this_build.operations, rel=0.1, abs=2)
 
 
