@@ -6,7 +6,7 @@ import shlex
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib.metadata import version
@@ -71,11 +71,17 @@ def compile_library(
 
     CompilerError when the compiler fails; the message names the log.
     """
-    command = [*compiler.command, *FLAGS, *map(str, sources), "-o", str(library)]
+    options = [*FLAGS, *map(str, sources), "-o", str(library)]
+    return run_compiler(compiler.command, options, library, log)
+
+
+def run_compiler(command: Sequence[str], options: Sequence[str], library: Path, log: Path) -> Path:
+    """Run ``command``, which must make ``library``; errors as of ``compile_library``."""
+    whole = [*command, *options]
     with log.open("w") as output:
-        output.write(shlex.join(command) + "\n")
+        output.write(shlex.join(whole) + "\n")
         output.flush()
-        done = subprocess.run(command, stdout=output, stderr=subprocess.STDOUT)
+        done = subprocess.run(whole, stdout=output, stderr=subprocess.STDOUT)
     if done.returncode != 0 or not library.exists():
-        raise CompilerError(f"{shlex.join(compiler.command)} failed; its log is {log}")
+        raise CompilerError(f"{shlex.join(command)} failed; its log is {log}")
     return library

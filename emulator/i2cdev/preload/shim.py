@@ -7,7 +7,6 @@ import platform
 import shlex
 import shutil
 import struct
-import subprocess
 import sys
 import tempfile
 from importlib.metadata import version
@@ -15,7 +14,7 @@ from pathlib import Path
 
 from cubestack.emulator.i2cdev.device_node import DeviceNode
 from cubestack.emulator.native.cache import cache_folder
-from cubestack.emulator.native.compiler import CompilerError, NoCompilerError
+from cubestack.emulator.native.compiler import CompilerError, NoCompilerError, run_compiler
 from cubestack.firmware_model.formats.linux_i2c import MAX_MESSAGE_BYTES, SMBUS_DATA_BYTES, Call
 
 SOURCE = Path(__file__).with_name("shim.c")
@@ -61,7 +60,8 @@ def shim_library(folder: Path | None = None) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=folder) as scratch:
             built = Path(scratch) / "shim.so"
-            _compile(compiler, built, library.with_suffix(".log"))
+            options = [*FLAGS, *_definitions(), str(SOURCE), "-o", str(built), *LIBRARIES]
+            run_compiler(compiler, options, built, library.with_suffix(".log"))
             built.replace(library)
     except OSError as error:
         raise CompilerError(
@@ -88,16 +88,6 @@ def _key(compiler: list[str]) -> str:
     digest = hashlib.sha256("\0".join(texts).encode())
     digest.update(SOURCE.read_bytes())
     return digest.hexdigest()[:24]
-
-
-def _compile(compiler: list[str], library: Path, log: Path) -> None:
-    command = [*compiler, *FLAGS, *_definitions(), str(SOURCE), "-o", str(library), *LIBRARIES]
-    with log.open("w") as output:
-        output.write(shlex.join(command) + "\n")
-        output.flush()
-        done = subprocess.run(command, stdout=output, stderr=subprocess.STDOUT)
-    if done.returncode != 0 or not library.exists():
-        raise CompilerError(f"{shlex.join(compiler)} failed; its log is {log}")
 
 
 def is_static(program: Path) -> bool:

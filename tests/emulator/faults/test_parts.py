@@ -3,16 +3,9 @@
 import numpy as np
 import pytest
 
+from cubestack.emulator.faults import parts
 from cubestack.emulator.faults.declaration import FaultError
 from cubestack.emulator.faults.injection import Injection
-from cubestack.emulator.faults.parts import (
-    BATCH_S,
-    MOST_UPSETS_PER_S,
-    CoreFaults,
-    MemoryFaults,
-    flip_bit,
-    flip_bits,
-)
 from cubestack.emulator.faults.table import CoreFlip, CoreUpsets, MemoryUpsets
 from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
 
@@ -24,7 +17,7 @@ class Part:
         self.kernel = Kernel()
         self.memory = np.zeros(BITS // 8, np.uint8)
         self.log: list[tuple[int, str]] = []
-        self.faults = MemoryFaults(self.kernel, self._report, self.memory)
+        self.faults = parts.MemoryFaults(self.kernel, self._report, self.memory)
         self.injection = Injection(0, MemoryUpsets(rate=rate), "SRAM", 0, None, seed)
         self.faults.begin(self.injection)
 
@@ -36,7 +29,9 @@ class Part:
         return int(np.unpackbits(self.memory).sum())
 
 
-@pytest.mark.parametrize("per_s", [100.0, 0.9 * MOST_UPSETS_PER_S, 10 * MOST_UPSETS_PER_S])
+@pytest.mark.parametrize(
+    "per_s", [100.0, 0.9 * parts.MOST_UPSETS_PER_S, 10 * parts.MOST_UPSETS_PER_S]
+)
 def test_upsets_follow_the_rate_everywhere(per_s: float) -> None:
     part = Part(per_s / BITS)
     found = part.run(2.0)
@@ -51,11 +46,11 @@ def test_upsets_follow_the_rate_everywhere(per_s: float) -> None:
 def test_highest_rate_takes_a_bounded_number_of_steps() -> None:
     part = Part(1.0)
     assert part.run(0.1) == pytest.approx(BITS / 2 * -np.expm1(-0.2), rel=0.02)
-    assert len(part.log) == round(0.1 / BATCH_S) - 1
+    assert len(part.log) == round(0.1 / parts.BATCH_S) - 1
     assert sum(int(text.split()[0]) for _, text in part.log) == pytest.approx(0.1 * BITS, rel=0.02)
 
 
-@pytest.mark.parametrize("per_s", [100.0, 10 * MOST_UPSETS_PER_S])
+@pytest.mark.parametrize("per_s", [100.0, 10 * parts.MOST_UPSETS_PER_S])
 def test_upsets_end_and_repeat_with_the_seed(per_s: float) -> None:
     parts = [Part(per_s / BITS, seed) for seed in (1, 1, 2)]
     counts = [part.run(0.5) for part in parts]
@@ -67,20 +62,20 @@ def test_upsets_end_and_repeat_with_the_seed(per_s: float) -> None:
 
 def test_one_bit_is_turned_over_and_back() -> None:
     memory = np.zeros(4, np.uint8)
-    flip_bit(memory, 13)
+    parts.flip_bit(memory, 13)
     assert memory.tolist() == [0, 0x20, 0, 0]
-    flip_bit(memory, 13)
+    parts.flip_bit(memory, 13)
     assert not memory.any()
 
 
 def test_the_rate_is_that_of_each_bit_and_the_seed_decides() -> None:
     first, again = np.zeros(200_000, np.uint8), np.zeros(200_000, np.uint8)
-    count = flip_bits(first, 1e-3, np.random.default_rng(1))
+    count = parts.flip_bits(first, 1e-3, np.random.default_rng(1))
     assert count == int(np.unpackbits(first).sum()) == pytest.approx(1600, rel=0.1)
-    assert flip_bits(again, 1e-3, np.random.default_rng(1)) == count
+    assert parts.flip_bits(again, 1e-3, np.random.default_rng(1)) == count
     np.testing.assert_array_equal(first, again)
     memory = np.zeros(10, np.uint8)
-    counts = [flip_bits(memory, rate, np.random.default_rng(1)) for rate in (0.0, 1.0)]
+    counts = [parts.flip_bits(memory, rate, np.random.default_rng(1)) for rate in (0.0, 1.0)]
     assert counts == [0, 80]
     assert (memory == 0xFF).all()
 
@@ -88,7 +83,7 @@ def test_the_rate_is_that_of_each_bit_and_the_seed_decides() -> None:
 @pytest.mark.parametrize("rate", [-0.1, 1.1, float("nan")])
 def test_rejects_invalid_probabilities(rate: float) -> None:
     with pytest.raises(ValueError, match="0 to 1 per bit"):
-        flip_bits(np.zeros(1, np.uint8), rate, np.random.default_rng(1))
+        parts.flip_bits(np.zeros(1, np.uint8), rate, np.random.default_rng(1))
 
 
 class Core:
@@ -97,7 +92,9 @@ class Core:
         self.flipped: list[tuple[str, int]] = []
         self.told: list[str] = []
         self.kernel = Kernel()
-        self.faults = CoreFaults(self.kernel, lambda _time, _of, text: self.told.append(text), self)
+        self.faults = parts.CoreFaults(
+            self.kernel, lambda _time, _of, text: self.told.append(text), self
+        )
 
     def flip(self, register: str, bit: int) -> None:
         self.flipped.append((register, bit))

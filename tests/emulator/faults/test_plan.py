@@ -11,14 +11,6 @@ from hypothesis import strategies as st
 from cubestack.emulator.faults import table
 from cubestack.emulator.faults.declaration import FaultError
 from cubestack.emulator.faults.plan import PlannedFault, load_plan, parse_plan
-from cubestack.emulator.faults.table import (
-    FAULTS,
-    AckLost,
-    LatchUp,
-    UartDrop,
-    make_fault,
-    markdown_table,
-)
 
 PLAN = """
 seed = 7
@@ -42,9 +34,9 @@ def test_a_plan(tmp_path: Path) -> None:
     plan = load_plan(path)
     assert (plan.seed, plan.name) == (7, str(path))
     assert plan.faults == (
-        PlannedFault(UartDrop(rate=0.25), None, 2, 0.5),
-        PlannedFault(LatchUp(lasting=True), "memory"),
-        PlannedFault(AckLost()),
+        PlannedFault(table.UartDrop(rate=0.25), None, 2, 0.5),
+        PlannedFault(table.LatchUp(lasting=True), "memory"),
+        PlannedFault(table.AckLost()),
     )
     assert parse_plan("").faults == ()
 
@@ -102,12 +94,12 @@ def test_damaged_plans_raise_only_plan_errors() -> None:
 DOCUMENT = Path(__file__).parents[3] / "docs" / "reference" / "fault-kinds.md"
 
 
-@pytest.mark.parametrize("kind", FAULTS)
+@pytest.mark.parametrize("kind", table.FAULTS)
 def test_a_fault_is_declared_in_full(kind: str) -> None:
-    fault = FAULTS[kind]
+    fault = table.FAULTS[kind]
     assert fault.kind == kind
     assert fault.effect().endswith(".")
-    assert fault() == make_fault(kind)  # every parameter has a default
+    assert fault() == table.make_fault(kind)  # every parameter has a default
     assert vars(table)[fault.__name__] is fault
     assert fault.__doc__ != "Base of all faults."
 
@@ -115,17 +107,17 @@ def test_a_fault_is_declared_in_full(kind: str) -> None:
 @example("kind", 1)
 @given(st.text(max_size=8), st.one_of(st.none(), st.text(), st.integers(), st.floats()))
 def test_any_value_raises_at_most_a_fault_error(name: str, value: object) -> None:
-    for kind, fault in FAULTS.items():
+    for kind, fault in table.FAULTS.items():
         for known in (name, *fault.declared()):
             with suppress(FaultError):
-                make_fault(kind, **{known: value})
+                table.make_fault(kind, **{known: value})
 
 
 def test_the_document_has_the_table_as_declared() -> None:
-    assert markdown_table() in DOCUMENT.read_text(encoding="utf-8")
+    assert table.markdown_table() in DOCUMENT.read_text(encoding="utf-8")
 
 
 def test_the_document_has_a_reaction_to_every_fault() -> None:
     reactions = DOCUMENT.read_text(encoding="utf-8").split("## What the firmware does about it")[1]
-    for kind in FAULTS:
+    for kind in table.FAULTS:
         assert f"| `{kind}` |" in reactions

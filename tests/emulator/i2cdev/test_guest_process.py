@@ -71,7 +71,7 @@ def test_built_once_of_each_source(tmp_path, monkeypatch):
     log = library.with_suffix(".log").read_text()
     assert len(log.splitlines()) == 1, log  # the command, and no warning
     with monkeypatch.context() as patch:
-        patch.setattr(shim, "_compile", None)
+        patch.setattr(shim, "run_compiler", None)
         assert shim.shim_library(tmp_path) == library
     source = tmp_path / "shim.c"
     source.write_bytes(shim.SOURCE.read_bytes() + b"\n")

@@ -1,4 +1,4 @@
-"""Transactions on the external bus: in bulk and pin by pin, on every design that has the bus."""
+"""Transactions on the external bus, in bulk and pin by pin; upsets of the design's registers."""
 
 from collections.abc import Iterator
 from dataclasses import replace

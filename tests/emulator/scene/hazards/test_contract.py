@@ -14,15 +14,7 @@ from cubestack.emulator.camera.mlx75412.lens import LENS
 from cubestack.emulator.camera.mt9m001.lens import double_gauss
 from cubestack.emulator.scene.file import SceneError
 from cubestack.emulator.scene.hazards import SKY_HAZARDS
-from cubestack.emulator.scene.hazards.contract import (
-    EARTH_RADIANCE,
-    CameraState,
-    SkyHazard,
-    angles_rad,
-    check_hazards,
-    direction,
-    random_direction_at,
-)
+from cubestack.emulator.scene.hazards import contract as sky
 from cubestack.emulator.scene.hazards.hazard import Hazard, Strength
 from cubestack.emulator.scene.hazards.moon import Moon
 from cubestack.emulator.scene.sky import SkyScene
@@ -31,10 +23,10 @@ from tests.emulator.scene.hazards.around import NOW, ORION, SHUTTER
 from tests.tiers import quick
 
 AXES = Rotation.from_euler("zyx", [50, -20, 10], degrees=True).as_matrix()
-ROUND = CameraState(AXES, 40, 20, 15, 1e-3)
+ROUND = sky.CameraState(AXES, 40, 20, 15, 1e-3)
 
 
-def off_axis_deg(state: CameraState, vector: np.ndarray) -> float:
+def off_axis_deg(state: sky.CameraState, vector: np.ndarray) -> float:
     return float(np.degrees(np.arccos(np.clip(state.boresight @ vector, -1, 1))))
 
 
@@ -55,7 +47,7 @@ def off_axis_deg(state: CameraState, vector: np.ndarray) -> float:
     ],
 )
 def test_a_direction_is_three_numbers_or_two_angles(values: Any, vector: Any) -> None:
-    np.testing.assert_allclose(direction("it", values), vector, atol=1e-12)
+    np.testing.assert_allclose(sky.direction("it", values), vector, atol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -74,14 +66,14 @@ def test_a_direction_is_three_numbers_or_two_angles(values: Any, vector: Any) ->
 )
 def test_rejects_invalid_directions(values: Any, words: str) -> None:
     with pytest.raises(SceneError, match=words):
-        direction("it", values)
+        sky.direction("it", values)
 
 
 def test_angles_are_exact_for_small_ones_too() -> None:
     for angle in (1e-9, 1e-4, 1.0, 3.0, np.pi):
         vectors = np.array([[np.cos(angle), np.sin(angle), 0.0], [1.0, 0.0, 0.0]])
         expected = [angle, 0.0]
-        found = angles_rad(vectors, np.array([1.0, 0, 0]))
+        found = sky.angles_rad(vectors, np.array([1.0, 0, 0]))
         np.testing.assert_allclose(found, expected, rtol=1e-7, atol=1e-15)
 
 
@@ -105,7 +97,7 @@ def test_places_are_in_the_picture_and_all_over_it() -> None:
 def test_beside_and_aside_are_at_the_angle_to_any_side(angle_deg: float) -> None:
     generator = np.random.default_rng(3)
     places = [ROUND.random_direction_at(angle_deg, generator) for _ in range(200)]
-    others = [random_direction_at(ROUND.boresight, angle_deg, generator) for _ in range(200)]
+    others = [sky.random_direction_at(ROUND.boresight, angle_deg, generator) for _ in range(200)]
     for found in (places, others):
         for vector in found:
             assert np.linalg.norm(vector) == pytest.approx(1)
@@ -116,19 +108,19 @@ def test_beside_and_aside_are_at_the_angle_to_any_side(angle_deg: float) -> None
 
 def test_plain_hazard_has_no_effect() -> None:
     vectors = np.eye(3)
-    nothing = SkyHazard()
+    nothing = sky.SkyHazard()
     assert nothing.lights(ROUND) is nothing.glow(ROUND, vectors) is None
     assert nothing.hidden(ROUND, vectors) is None
     assert (nothing.rings(ROUND), nothing.speed_deg_s, nothing.seed) == ((), 0.0, 0)
     assert nothing.apparent(ROUND, vectors) is vectors
-    check_hazards((nothing, Moon()))
+    sky.check_hazards((nothing, Moon()))
     with pytest.raises(SceneError, match="hazards must be hazards of light, not 5"):
-        check_hazards((nothing, 5))
+        sky.check_hazards((nothing, 5))
 
 
 def test_the_earth_s_radiance_is_that_of_its_albedo() -> None:
     """0.3 of the Sun's light on a Lambert surface, by pi; the Sun is V -26.74."""
-    assert np.pi * EARTH_RADIANCE / 10 ** (0.4 * 26.74) == pytest.approx(0.3)
+    assert np.pi * sky.EARTH_RADIANCE / 10 ** (0.4 * 26.74) == pytest.approx(0.3)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -154,7 +146,7 @@ KINDS = list(SKY_HAZARDS.values())
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
-def test_hazard_describes_itself(kind: type[SkyHazard]) -> None:
+def test_hazard_describes_itself(kind: type[sky.SkyHazard]) -> None:
     assert 4 < len(kind.meaning) < 70
     assert 5 <= len(kind.strength.values) <= 7
     assert kind.strength.usual in kind.strength.values
@@ -163,7 +155,7 @@ def test_hazard_describes_itself(kind: type[SkyHazard]) -> None:
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
 @pytest.mark.parametrize("optics", quick([LENS, double_gauss()], 1), ids=["cubestar", "aramis"])
-def test_every_strength_renders(kind: type[SkyHazard], optics: Optics) -> None:
+def test_every_strength_renders(kind: type[sky.SkyHazard], optics: Optics) -> None:
     now = camera_state(ORION, optics, SHUTTER)
     for seed, strength in enumerate(kind.strength.values):
         hazard = kind.sample(strength, now, np.random.default_rng(seed))
@@ -173,7 +165,7 @@ def test_every_strength_renders(kind: type[SkyHazard], optics: Optics) -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
-def test_worst_disturbs_more_than_mildest(kind: type[SkyHazard]) -> None:
+def test_worst_disturbs_more_than_mildest(kind: type[sky.SkyHazard]) -> None:
     now = camera_state(ORION, LENS, SHUTTER)
     clean = star_light(ORION, LENS, SHUTTER)
     mild, bad = (
@@ -189,7 +181,7 @@ def test_worst_disturbs_more_than_mildest(kind: type[SkyHazard]) -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
-def test_is_drawn_from_the_generator_alone(kind: type[SkyHazard]) -> None:
+def test_is_drawn_from_the_generator_alone(kind: type[sky.SkyHazard]) -> None:
     first, same, other = (
         kind.sample(kind.strength.usual, NOW, np.random.default_rng(seed)) for seed in (1, 1, 2)
     )
@@ -198,7 +190,7 @@ def test_is_drawn_from_the_generator_alone(kind: type[SkyHazard]) -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
-def test_sampled_hazard_round_trips_through_a_file(kind: type[SkyHazard]) -> None:
+def test_sampled_hazard_round_trips_through_a_file(kind: type[sky.SkyHazard]) -> None:
     hazard = kind.sample(kind.strength.usual, NOW, np.random.default_rng(4))
     assert set(kind.declared()) == {entry.name for entry in fields(kind)}
     values = {entry.name: getattr(hazard, entry.name) for entry in fields(kind)}
@@ -211,7 +203,7 @@ def test_sampled_hazard_round_trips_through_a_file(kind: type[SkyHazard]) -> Non
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
-def test_lights_move_at_the_declared_rate(kind: type[SkyHazard]) -> None:
+def test_lights_move_at_the_declared_rate(kind: type[sky.SkyHazard]) -> None:
     """By that the renderer knows how often to look at them."""
     now = camera_state(ORION, LENS, SHUTTER)
     hazard = kind.sample(kind.strength.usual, now, np.random.default_rng(3))

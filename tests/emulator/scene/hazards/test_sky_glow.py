@@ -1,15 +1,8 @@
 import numpy as np
 import pytest
 
-from cubestack.emulator.scene.hazards import ephemeris
+from cubestack.emulator.scene.hazards import ephemeris, sky_glow
 from cubestack.emulator.scene.hazards.contract import direction
-from cubestack.emulator.scene.hazards.sky_glow import (
-    LATITUDES_DEG,
-    LONGITUDES_DEG,
-    SkyGlow,
-    milky_way,
-    zodiacal,
-)
 from tests.emulator.scene.hazards.around import NOW
 
 TABLE_16 = """\
@@ -36,35 +29,37 @@ TABLE_16 = """\
 """Leinert et al. 1998: the measurements of table 17 in S10, for the same places."""
 
 
-def mag_arcsec2(hazard: SkyGlow, vector: np.ndarray) -> float:
+def mag_arcsec2(hazard: sky_glow.SkyGlow, vector: np.ndarray) -> float:
     glow = hazard.glow(NOW, vector[None])
     return float(-2.5 * np.log10(glow[0] / 4.2545e10))
 
 
 def test_ecliptic_pole_is_60_s10_or_v_23_3() -> None:
     pole = ephemeris.FROM_ECLIPTIC[:, 2]
-    assert mag_arcsec2(SkyGlow(milky_way=0), pole) == pytest.approx(23.3, abs=0.05)
+    assert mag_arcsec2(sky_glow.SkyGlow(milky_way=0), pole) == pytest.approx(23.3, abs=0.05)
 
 
 def test_zodiacal_light_by_the_other_table() -> None:
     """Both tables are rounded, to three digits at most."""
     s10 = np.array([line.replace("-", "nan").split() for line in TABLE_16.splitlines()], float)
     s10 = np.column_stack([s10, np.full(len(s10), 60)])  # the pole's, which is not in the table
-    longitudes, latitudes = np.meshgrid(LONGITUDES_DEG, LATITUDES_DEG, indexing="ij")
+    longitudes, latitudes = np.meshgrid(
+        sky_glow.LONGITUDES_DEG, sky_glow.LATITUDES_DEG, indexing="ij"
+    )
     known = np.isfinite(s10)
-    found = zodiacal(longitudes[known].astype(float), latitudes[known].astype(float))
+    found = sky_glow.zodiacal(longitudes[known].astype(float), latitudes[known].astype(float))
     np.testing.assert_allclose(found, s10[known], rtol=0.004, atol=0.4)
 
 
 def test_zodiacal_light_has_no_steps() -> None:
     longitudes = np.linspace(15, 180, 3301)
     for latitude in (0.0, 7.0, 44.99, 45.01, 80.0):
-        light = zodiacal(longitudes, np.full_like(longitudes, latitude))
+        light = sky_glow.zodiacal(longitudes, np.full_like(longitudes, latitude))
         assert np.abs(np.diff(np.log(light))).max() < 0.01
 
 
 def test_is_brighter_towards_the_sun_of_the_date() -> None:
-    hazard = SkyGlow(milky_way=0, julian_date=ephemeris.NEW_YEAR_2026)
+    hazard = sky_glow.SkyGlow(milky_way=0, julian_date=ephemeris.NEW_YEAR_2026)
     sun = -ephemeris.heliocentric("earth", ephemeris.NEW_YEAR_2026)
     sun /= np.linalg.norm(sun)
     beside = np.cross(ephemeris.FROM_ECLIPTIC[:, 2], sun)
@@ -75,19 +70,21 @@ def test_is_brighter_towards_the_sun_of_the_date() -> None:
 def test_milky_way_at_the_published_places() -> None:
     pole = direction("pole", (192.85948, 27.12825))
     centre, away = direction("centre", (266.405, -28.936)), direction("away", (86.405, 28.936))
-    np.testing.assert_allclose(milky_way(np.array([pole, centre, away])), [30, 640, 160], rtol=0.02)
+    np.testing.assert_allclose(
+        sky_glow.milky_way(np.array([pole, centre, away])), [30, 640, 160], rtol=0.02
+    )
 
 
 def test_milky_way_is_a_band() -> None:
     cygnus, lyra = direction("Cygnus", (305.0, 40.0)), direction("Bootes", (213.9, 19.2))
-    in_it, beside = milky_way(np.array([cygnus, lyra]))
+    in_it, beside = sky_glow.milky_way(np.array([cygnus, lyra]))
     assert in_it > 5 * beside
 
 
 @pytest.mark.parametrize("away_deg", [15.0, 60.0, 180.0])
 def test_is_placed_at_a_longitude_from_the_sun(away_deg: float) -> None:
     for seed in range(4):
-        hazard = SkyGlow.sample(away_deg, NOW, np.random.default_rng(seed))
+        hazard = sky_glow.SkyGlow.sample(away_deg, NOW, np.random.default_rng(seed))
         x, y, _ = NOW.boresight @ ephemeris.FROM_ECLIPTIC
         from_sun = np.degrees(np.arctan2(y, x)) - ephemeris.sun_longitude_deg(hazard.julian_date)
         assert abs((from_sun + 180) % 360 - 180) == pytest.approx(away_deg, abs=0.01)

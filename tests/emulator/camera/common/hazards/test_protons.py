@@ -6,15 +6,9 @@ import numpy as np
 import pytest
 
 from cubestack.emulator.camera.common.dark import dark_at, hot_pixels
+from cubestack.emulator.camera.common.hazards import protons
 from cubestack.emulator.camera.common.hazards.contract import Exposure
 from cubestack.emulator.camera.common.hazards.dose import Dose
-from cubestack.emulator.camera.common.hazards.protons import (
-    PAIR_EV,
-    Protons,
-    _tracks,
-    lost_kev,
-    mean_loss_kev,
-)
 
 CUBESTAR = Exposure((512, 1024), 5.6, 0.3856, 20.0, 36.48)
 ONE = np.ones(1)
@@ -24,7 +18,7 @@ def drawn(seed: int) -> np.random.Generator:
     return np.random.default_rng(seed)
 
 
-def charge(hazard: Protons, seed: int = 0, exposure: Exposure = CUBESTAR) -> np.ndarray:
+def charge(hazard: protons.Protons, seed: int = 0, exposure: Exposure = CUBESTAR) -> np.ndarray:
     image = hazard.charge(exposure, drawn(seed))
     return np.zeros(exposure.shape, np.float32) if image is None else image
 
@@ -32,17 +26,17 @@ def charge(hazard: Protons, seed: int = 0, exposure: Exposure = CUBESTAR) -> np.
 # PSTAR, silicon, total stopping power in MeV cm2/g; 2.329 g/cm3.
 @pytest.mark.parametrize(("mev", "pstar"), [(10, 34.6), (50, 9.9), (100, 5.8), (1000, 1.77)])
 def test_mean_loss_is_the_published_stopping_power(mev: float, pstar: float) -> None:
-    assert mean_loss_kev(mev * ONE, ONE)[0] == pytest.approx(pstar * 0.2329, rel=0.03)
+    assert protons.mean_loss_kev(mev * ONE, ONE)[0] == pytest.approx(pstar * 0.2329, rel=0.03)
 
 
 def test_least_ionising_protons_free_some_fifty_electrons_a_um_in_thin_layers() -> None:
     # Measured: most probable 0.19 to 0.23 keV/um in 5.6 to 10 um; some 80 pairs in 300 um.
     many = np.ones(40_000)
-    thin = lost_kev(2500 * many, 8 * many, drawn(1)) / 8
+    thin = protons.lost_kev(2500 * many, 8 * many, drawn(1)) / 8
     counts, edges = np.histogram(thin, 60, (0, 0.6))
     assert edges[np.argmax(counts)] == pytest.approx(0.19, abs=0.03)
-    thick = np.median(lost_kev(2500 * many, 300 * many, drawn(2))) / 300
-    assert thick * 1000 / PAIR_EV == pytest.approx(80, rel=0.1)
+    thick = np.median(protons.lost_kev(2500 * many, 300 * many, drawn(2))) / 300
+    assert thick * 1000 / protons.PAIR_EV == pytest.approx(80, rel=0.1)
 
 
 def test_the_most_probable_loss_is_below_the_mean_by_landaus_curve() -> None:
@@ -51,14 +45,14 @@ def test_the_most_probable_loss_is_below_the_mean_by_landaus_curve() -> None:
     beta2 = 1 - gamma**-2
     xi, largest = 0.01783 * 8 / beta2, 1022 * (gamma**2 - 1) / 1.0023
     peak = 1.77 * 0.2329 * 8 + xi * (0.2 + beta2 + np.log(xi / largest))
-    lost = lost_kev(1000 * np.ones(40_000), 8 * np.ones(40_000), drawn(4))
+    lost = protons.lost_kev(1000 * np.ones(40_000), 8 * np.ones(40_000), drawn(4))
     # Half of Moyal's curve, which stands in for it, is beyond 0.787 xi above the peak.
     assert np.median(lost) - 0.787 * xi == pytest.approx(peak, abs=0.1)
 
 
 def test_slow_protons_free_thousands() -> None:
     many = np.ones(20_000)
-    electrons = lost_kev(20 * many, 8 * many, drawn(3)) * 1000 / PAIR_EV
+    electrons = protons.lost_kev(20 * many, 8 * many, drawn(3)) * 1000 / protons.PAIR_EV
     # 20 MeV: 19.7 MeV cm2/g, of which fast delta rays take a little; 3.65 eV a pair.
     assert electrons.mean() == pytest.approx(19.7 * 0.2329 * 8 * 1000 / 3.65, rel=0.1)
     assert electrons.min() > 0
@@ -66,11 +60,11 @@ def test_slow_protons_free_thousands() -> None:
 
 def test_number_of_hits_follows_rate_area_and_exposure() -> None:
     # 0.1644 cm2 for 0.3856 s at 500 / (cm2 s), and at 3000 over a pole.
-    assert Protons().mean_hits(CUBESTAR) == pytest.approx(31.7, rel=0.01)
+    assert protons.Protons().mean_hits(CUBESTAR) == pytest.approx(31.7, rel=0.01)
     area = 512 * 1024 * 5.6e-4**2
-    solar = Protons(orbit="solar").mean_hits(CUBESTAR)
+    solar = protons.Protons(orbit="solar").mean_hits(CUBESTAR)
     assert solar == pytest.approx(3000 * area * 0.3856, rel=1e-5)
-    quiet = Protons(orbit="quiet")
+    quiet = protons.Protons(orbit="quiet")
     hit = sum(bool(charge(quiet, seed).any()) for seed in range(400))
     assert hit / 400 == pytest.approx(1 - np.exp(-0.0634), abs=0.04)
 
@@ -81,7 +75,7 @@ def test_tracks_are_as_long_as_isotropic_incidence_says() -> None:
     # across as the layer is deep, a tenth three times that.
     lengths = []
     for seed in range(600):
-        image = charge(Protons(hits=1, orbit="quiet"), seed)
+        image = charge(protons.Protons(hits=1, orbit="quiet"), seed)
         y, x = np.nonzero(image)
         if len(x):
             spread = sum(np.cov(axis * 5.6, aweights=image[y, x], ddof=0) for axis in (x, y))
@@ -93,28 +87,28 @@ def test_tracks_are_as_long_as_isotropic_incidence_says() -> None:
 
 def test_track_charge_equals_the_energy_loss() -> None:
     hits = 3000
-    total = charge(Protons(hits=hits)).sum()
+    total = charge(protons.Protons(hits=hits)).sum()
     generator = drawn(9)
     energies = np.clip(60 * 2.5 ** generator.standard_normal(hits), 5, 1e5)
     paths = 8 / np.maximum(np.sqrt(generator.random(hits)), 0.02)
-    near = (lost_kev(energies, paths, generator) * 1000 / PAIR_EV).sum()
+    near = (protons.lost_kev(energies, paths, generator) * 1000 / protons.PAIR_EV).sum()
     # Delta rays leave a few percent more; some charge falls beside the sensor.
     assert 0.9 * near < total < 1.2 * near
 
 
 def test_a_track_has_its_charge_evenly_about_its_middle() -> None:
     starts, along = np.array([[60.0, 20.0]]), np.array([[900.0, 450.0]])
-    image = _tracks(starts, along, 1e6 * ONE, CUBESTAR, drawn(5))
+    image = protons._tracks(starts, along, 1e6 * ONE, CUBESTAR, drawn(5))
     middle = [np.average(axis, weights=image) for axis in np.indices(image.shape)[::-1]]
     np.testing.assert_allclose(middle, [510, 245], atol=0.006)
 
 
 def test_tracks_repeat_per_frame_and_differ_between_frames() -> None:
-    first = charge(Protons(hits=100), 1)
-    np.testing.assert_array_equal(first, charge(Protons(hits=100), 1))
-    other = charge(Protons(hits=100), 2)
+    first = charge(protons.Protons(hits=100), 1)
+    np.testing.assert_array_equal(first, charge(protons.Protons(hits=100), 1))
+    other = charge(protons.Protons(hits=100), 2)
     assert np.sum((first > 0) & (other > 0)) < 0.05 * np.sum(first > 0)
-    assert Protons(hits=0).charge(CUBESTAR, drawn(0)) is None
+    assert protons.Protons(hits=0).charge(CUBESTAR, drawn(0)) is None
 
 
 WARM = Exposure((512, 1024), 5.6, 0.3856, 27.0, 36.48)
