@@ -15,7 +15,7 @@ from cocotb_tools.runner import Runner
 
 from cubestack.hdl.flow.generate import verilog_text
 from tests.hdl import regression
-from tests.hdl.coverage import hits
+from tests.hdl.coverage import points
 from tests.hdl.regression import BASE_SEED, HERE, PAIR, SIMULATOR, Outcome
 
 # Registers start at X instead of the value that Verilog's initialisers give them: the real part
@@ -48,14 +48,14 @@ def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
     folder = os.environ.get("HDL_COVERAGE")
     here = not hasattr(session.config, "workerinput")
     judged = folder and here and exitstatus == 0 and SIMULATOR == "icarus"
-    if judged and hits.missed(hits.merged(Path(folder))):
+    if judged and points.missed(points.merged(Path(folder))):
         session.exitstatus = pytest.ExitCode.TESTS_FAILED
 
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:
     if folder := os.environ.get("HDL_COVERAGE"):
         terminalreporter.section("functional coverage")
-        for line in hits.table(hits.merged(Path(folder))):
+        for line in points.table(points.merged(Path(folder))):
             terminalreporter.write_line(line)
 
 

@@ -149,7 +149,7 @@ DOUBLE = "next_version:DoubleTestbench"
 
 #: By the tops' names, as the command line has them; some have a further one.
 TIERS = {
-    "cubestar": _star(CubeStarTop, "published:PublishedTestbench", "read", "modes", "store"),
+    "cubestar": _star(CubeStarTop, "board:PublishedTestbench", "read", "modes", "store"),
     "cubestar-shared": _star(CubeStarShared, SHARED, "bus", "shared", "states"),
     "cubestar-double": _star(CubeStarDouble, DOUBLE, "bus", "double", "states"),
     "cubestar-boards": _star(CubeStarTwoBoards, "next_version:BoardsTestbench", "bus", "states"),

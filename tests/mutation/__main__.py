@@ -25,8 +25,7 @@ from queue import Queue
 
 from tests.mutation.mutants import PARTS, Mutant, modules, mutants
 from tests.mutation.reached import record
-from tests.mutation.suite import ROOT, Suite
-from tests.mutation.trial import Copy
+from tests.mutation.trial import ROOT, Copy, Suite
 
 ENOUGH = 0.9
 

@@ -8,7 +8,7 @@ from coverage import CoverageData
 from tests.mutation.__main__ import chosen
 from tests.mutation.mutants import Mutant, modules, mutants
 from tests.mutation.reached import DATA, DOCUMENTS, FOLDER, MOST_TESTS, TIMES, Reached
-from tests.mutation.suite import ROOT, files_for, near
+from tests.mutation.trial import ROOT, files_for, near
 
 HERE = Path("a.py")
 

@@ -21,9 +21,9 @@ from cubesense_fpga_i2c.register_table import (
 from tests.hdl.cubesense.reference import SIDES
 from tests.hdl.cubesense.settings import READ_OUT
 from tests.hdl.harness.camera import picture
-from tests.hdl.harness.geometry import GEOMETRY
-from tests.hdl.harness.instants import ODD, wait
+from tests.hdl.harness.reference import GEOMETRY
 from tests.hdl.harness.testbench import timed_test
+from tests.hdl.harness.timing import ODD, wait
 
 FAST = 1_000_000
 ALL = (*ADDRESSES.values(), GROUP_ADDRESS)

@@ -11,7 +11,7 @@ from tests.hdl.cubesense.pair import OTHER, frame
 from tests.hdl.cubesense.reference import NOT_FOUND, SIDES
 from tests.hdl.cubesense.settings import READ_OUT
 from tests.hdl.harness.camera import flat, lines, picture
-from tests.hdl.harness.geometry import GEOMETRY
+from tests.hdl.harness.reference import GEOMETRY
 from tests.hdl.harness.testbench import timed_test
 
 FAST = 1_000_000

@@ -12,9 +12,9 @@ from i2c_bus import SPEEDS
 from cubesense_fpga_i2c.register_table import ADDRESSES, Register, pointer_bytes
 from tests.hdl.cubesense.reference import SIDES
 from tests.hdl.cubesense.settings import READ_OUT
-from tests.hdl.harness.geometry import GEOMETRY
-from tests.hdl.harness.instants import now
+from tests.hdl.harness.reference import GEOMETRY
 from tests.hdl.harness.testbench import timed_test
+from tests.hdl.harness.timing import now
 
 
 async def read_at(bench: I2cBench, side: str, x: int, y: int, count: int, down: bool) -> bytes:

@@ -16,9 +16,9 @@ from tests.hdl.cubesense.pair import OTHER, PREFIXES, frame
 from tests.hdl.cubesense.reference import SIDES, Controls, Half, behaviour
 from tests.hdl.cubesense.settings import READ_OUT
 from tests.hdl.harness.camera import Camera
-from tests.hdl.harness.geometry import GEOMETRY
-from tests.hdl.harness.instants import ODD, now, wait
+from tests.hdl.harness.reference import GEOMETRY
 from tests.hdl.harness.sram import UNKNOWN, Sram
+from tests.hdl.harness.timing import ODD, now, wait
 from tests.hdl.harness.watching import Levels, levels, never_high, watch
 
 STANDBY = Actions(Action.STANDBY, Action.STANDBY)

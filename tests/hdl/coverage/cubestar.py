@@ -4,8 +4,7 @@ import os
 from collections.abc import Sequence
 from itertools import pairwise
 
-from tests.hdl.coverage.hits import hit
-from tests.hdl.coverage.points import CUBESTAR
+from tests.hdl.coverage.points import CUBESTAR, hit
 from tests.hdl.harness.reference import Clock, Controls, Window, windows
 from tests.hdl.harness.store_states import left_in, read_state, steps
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from cubestack.firmware_model.interface.cubesense.fpga import COMMANDS, Action
-from tests.hdl.coverage import hits
+from tests.hdl.coverage import points
 from tests.hdl.coverage.points import GROUPS, row_of, states_of
 
 HERE = Path(__file__).parent
@@ -19,31 +19,31 @@ BOARD = "PublishedTestbench"
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("HDL_COVERAGE", str(tmp_path))
-    monkeypatch.setattr(hits, "_noted", set())
+    monkeypatch.setattr(points, "_noted", set())
     return tmp_path
 
 
 def test_covered_points_are_not_missed(folder: Path) -> None:
     everything = [(name, point) for name, group in GROUPS.items() for point in group.points()]
-    assert hits.missed(hits.merged(folder)) == everything
+    assert points.missed(points.merged(folder)) == everything
     for _ in range(2):
-        hits.hit("pressure", testbench=BOARD, pressure="steady")
+        points.hit("pressure", testbench=BOARD, pressure="steady")
     (file,) = folder.iterdir()
     (folder / "other.txt").write_text(f"pressure\t{BOARD}\tslow processor\n", encoding="utf-8")
-    found = hits.merged(folder)
+    found = points.merged(folder)
     assert found["pressure"] == {(BOARD, "steady"), (BOARD, "slow processor")}
-    assert len(hits.missed(found)) == len(everything) - 2
+    assert len(points.missed(found)) == len(everything) - 2
     assert len(file.read_text(encoding="utf-8").splitlines()) == 1
-    lines = list(hits.table(found, most=3))
+    lines = list(points.table(found, most=3))
     assert len(lines) == len(GROUPS) + 4
     assert lines[-1] == f"not reached: {len(everything) - 5} more"
 
 
 def test_rejects_undeclared_points(folder: Path) -> None:
     with pytest.raises(ValueError, match=f"{BOARD} / idle is no declared point of 'pressure'"):
-        hits.hit("pressure", testbench=BOARD, pressure="idle")
+        points.hit("pressure", testbench=BOARD, pressure="idle")
     with pytest.raises(ValueError, match="has testbench, pressure, not testbench"):
-        hits.hit("pressure", testbench=BOARD)
+        points.hit("pressure", testbench=BOARD)
 
 
 def test_every_row_of_the_table_is_declared() -> None:

@@ -10,16 +10,21 @@ import cocotb
 from cocotb.triggers import Timer
 
 from tests.hdl.coverage import cubesense as coverage
-from tests.hdl.cubesense.reference import NOT_FOUND, SIDES, Controls, Half, behaviour
-from tests.hdl.cubesense.settings import MCU_ADDRESSING, READ_OUT
+from tests.hdl.cubesense.reference import (
+    MCU_ADDRESSING,
+    NOT_FOUND,
+    READ_OUT,
+    SIDES,
+    Controls,
+    Half,
+    behaviour,
+)
 from tests.hdl.harness.camera import Camera, flat, lines, vsync
-from tests.hdl.harness.geometry import GEOMETRY
-from tests.hdl.harness.instants import ODD, wait
 from tests.hdl.harness.processor import Processor
-from tests.hdl.harness.reference import Tick
+from tests.hdl.harness.reference import GEOMETRY, Tick
 from tests.hdl.harness.sram import UNKNOWN, Sram
 from tests.hdl.harness.testbench import Testbench
-from tests.hdl.harness.timing import ANY, Timing
+from tests.hdl.harness.timing import ANY, ODD, Timing, wait
 from tests.hdl.harness.watching import Levels, levels, never_high, watch
 
 Place = tuple[str, str]  #: Camera and memory

@@ -4,6 +4,8 @@ Follows the command table and the wording of the blocks' docstrings; whole frame
 read-outs at once, not clock by clock.
 """
 
+import json
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain, cycle, groupby, islice, pairwise, product
@@ -11,9 +13,13 @@ from typing import NamedTuple
 
 from cubestack.firmware_model.interface.cubesense import fpga
 from cubestack.firmware_model.interface.cubesense.fpga import SUN_RUN, SUN_THRESHOLD, Action
-from tests.hdl.cubesense.settings import MCU_ADDRESSING, READ_OUT
-from tests.hdl.harness.geometry import GEOMETRY
-from tests.hdl.harness.reference import Clock, Pulse, Tick, taken, write
+from tests.hdl.harness.reference import GEOMETRY, Clock, Pulse, Tick, taken, write
+
+#: Settings of the simulation that imports this, from its environment.
+READ_OUT = fpga.ReadOut(**json.loads(os.environ["READ_OUT"]))
+
+#: Whether the design has address control from the microcontroller.
+MCU_ADDRESSING = os.environ.get("MCU_ADDRESSING") == "1"
 
 SIDES = ("sun", "nadir")
 NEVER = 1 << 62

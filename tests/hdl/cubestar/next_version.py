@@ -7,8 +7,8 @@ from typing import Any, ClassVar, NamedTuple
 import cocotb
 
 from tests.hdl.cubestar.board import CubeStarTestbench
-from tests.hdl.harness.external_bus import Ebi
-from tests.hdl.harness.geometry import GEOMETRY
+from tests.hdl.harness.processor import Ebi
+from tests.hdl.harness.reference import GEOMETRY
 from tests.hdl.harness.sram import Sram
 from tests.hdl.harness.timing import ANY, Timing
 from tests.hdl.harness.watching import never_high

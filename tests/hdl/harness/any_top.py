@@ -11,12 +11,11 @@ from typing import Any
 import cocotb
 from cocotb.triggers import Timer
 
-from tests.hdl.coverage.hits import hit
+from tests.hdl.coverage.points import hit
 from tests.hdl.harness.camera import picture
-from tests.hdl.harness.geometry import GEOMETRY
-from tests.hdl.harness.instants import ODD, wait
+from tests.hdl.harness.reference import GEOMETRY
 from tests.hdl.harness.testbench import Testbench
-from tests.hdl.harness.timing import PRESSURES, Timing
+from tests.hdl.harness.timing import ODD, PRESSURES, Timing, wait
 
 MODULE, NAME = os.environ["TESTBENCH"].split(":")
 TESTBENCH: Any = getattr(import_module(MODULE), NAME)

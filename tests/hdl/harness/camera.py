@@ -9,10 +9,8 @@ from typing import Any, TypeVar
 
 from cocotb.triggers import Event, FallingEdge, RisingEdge
 
-from tests.hdl.harness.geometry import GEOMETRY
-from tests.hdl.harness.instants import EVEN, now, wait
-from tests.hdl.harness.reference import Clock, Tick
-from tests.hdl.harness.timing import ANY, Timing, between
+from tests.hdl.harness.reference import GEOMETRY, Clock, Tick
+from tests.hdl.harness.timing import ANY, EVEN, Timing, between, now, wait
 
 T = TypeVar("T")
 

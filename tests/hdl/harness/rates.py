@@ -5,8 +5,7 @@ from typing import Any
 
 import cocotb
 
-from tests.hdl.coverage.hits import hit
-from tests.hdl.coverage.points import PHASES, PIXEL_MHZ
+from tests.hdl.coverage.points import PHASES, PIXEL_MHZ, hit
 from tests.hdl.harness.any_top import TESTBENCH, slow_test, works
 from tests.hdl.harness.timing import DATA_HALVES, fixed
 

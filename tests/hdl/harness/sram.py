@@ -8,16 +8,12 @@ import cocotb
 from cocotb.triggers import Event, FallingEdge, First, ReadOnly, Timer
 from cocotb.types import LogicArray
 
-from tests.hdl.harness.geometry import GEOMETRY
-from tests.hdl.harness.instants import now
-from tests.hdl.harness.reference import Pulse
+from tests.hdl.harness.reference import GEOMETRY, Pulse
+from tests.hdl.harness.timing import SLOWEST_ACCESS, now
 
 UNKNOWN = LogicArray("X" * 8)
 
 OUTPUTS = ("A", "D_O", "D_OE", "CE_N", "OE_N", "WE_N")  #: An SRAM's pins that the FPGA drives
-
-#: Longest time in ps from an address to its byte. The real part is quicker than this.
-SLOWEST_ACCESS = 12_000
 
 
 class Sram:

@@ -7,8 +7,7 @@ another point and no more.
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from tests.hdl.harness.geometry import GEOMETRY
-from tests.hdl.harness.reference import Clock, Tick
+from tests.hdl.harness.reference import GEOMETRY, Clock, Tick
 
 
 class Step(NamedTuple):

@@ -6,8 +6,13 @@ without delays has no other one, so it is no rate of the part.
 
 import random
 from dataclasses import dataclass
+from typing import Any
 
-from tests.hdl.harness.sram import SLOWEST_ACCESS
+from cocotb.triggers import Timer
+from cocotb.utils import get_sim_time
+
+#: Longest time in ps from an address to its byte. The real part is quicker than this.
+SLOWEST_ACCESS = 12_000
 
 #: Halves of the data clock in ps by name: the processors' (37 cycles of 48 MHz, two instructions
 #: of 5 MHz), 1 MB/s, and the limit.
@@ -60,3 +65,33 @@ def fixed(pixel_mhz: float, data_half: int, phase: float) -> Timing:
 
 def between(limits: tuple[int, int]) -> int:
     return random.randint(*limits)
+
+
+#: The camera acts at even picoseconds and the microcontroller at odd ones. In a real flip-flop the
+#: result of a coincidence is open; in a simulation it would be an accident of the order of events.
+EVEN, ODD = 0, 1
+
+
+def now() -> int:
+    """Simulated time in ps."""
+    return int(get_sim_time("step"))
+
+
+async def wait(ps: int, parity: int) -> None:
+    """Wait for ``ps``, or one more, until a picosecond of that ``parity``; never for nothing."""
+    await Timer(max(ps, 1) + (now() + max(ps, 1) + parity) % 2, unit="step")
+
+
+async def some_time() -> None:
+    await Timer(random.randint(1, 50), unit="ns")
+
+
+async def clock(dut: Any, domain: str, reset: int = 0, **pins: int) -> None:
+    """Drive ``pins``, then one rising edge of the domain's clock; falls at the next call."""
+    getattr(dut, f"{domain}_clk").value = 0
+    getattr(dut, f"{domain}_rst").value = reset
+    for name, level in pins.items():
+        getattr(dut, name).value = level
+    await some_time()
+    getattr(dut, f"{domain}_clk").value = 1
+    await some_time()

@@ -19,8 +19,7 @@ from rich.console import Console
 from rich.progress import Progress, SpinnerColumn
 from rich.table import Table
 
-from tests.hdl.mutants.scoring import Result, Score, Scoring
-from tests.hdl.mutants.suites import SUITES
+from tests.hdl.mutants.scoring import SUITES, Result, Score, Scoring
 
 ENOUGH = 0.95
 FOLDER = Path(__file__).parents[3] / "out" / "mutants"

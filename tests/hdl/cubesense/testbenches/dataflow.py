@@ -9,7 +9,7 @@ from cocotb.triggers import Timer
 from cocotb.types import LogicArray
 
 from cubestack.firmware_model.interface.cubesense.fpga import Action, actions, link_shows_enables
-from tests.hdl.cubesense.settings import MCU_ADDRESSING
+from tests.hdl.cubesense.reference import MCU_ADDRESSING
 
 SIDE = os.environ["SIDE"]
 ADDRESSING = {Action.TAKE_ADDRESS, Action.READ_FROM}

@@ -5,9 +5,9 @@ from typing import Any
 
 import cocotb
 
-from tests.hdl.coverage.hits import hit
+from tests.hdl.coverage.points import hit
 from tests.hdl.cubesense.pair import OTHER, SIDES, PairTestbench, coordinates, window_of, with_sun
-from tests.hdl.cubesense.settings import READ_OUT
+from tests.hdl.cubesense.reference import READ_OUT
 from tests.hdl.harness.testbench import timed_test
 
 COLUMNS, ROWS = READ_OUT.columns, READ_OUT.rows

@@ -6,7 +6,7 @@ from typing import Any
 
 from cocotb.triggers import Timer
 
-from tests.hdl.harness.geometry import GEOMETRY
+from tests.hdl.harness.reference import GEOMETRY
 from tests.hdl.harness.testbench import timed_test
 from tests.hdl.harness.watching import disturb_in_standby, levels
 

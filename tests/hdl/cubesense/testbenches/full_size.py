@@ -5,7 +5,7 @@ from typing import Any
 import cocotb
 from cocotb.triggers import First, RisingEdge, Timer
 
-from tests.hdl.cubesense.settings import READ_OUT
+from tests.hdl.cubesense.reference import READ_OUT
 
 SUN, NADIR = 0, 1
 PICTURE, SCAN, WINDOW = 0, 1, 2

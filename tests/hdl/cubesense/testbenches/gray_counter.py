@@ -5,7 +5,8 @@ from typing import Any
 
 import cocotb
 
-from tests.hdl.cubesense.settings import READ_OUT, clock
+from tests.hdl.cubesense.reference import READ_OUT
+from tests.hdl.harness.timing import clock
 
 POSITIONS = READ_OUT.pixels
 

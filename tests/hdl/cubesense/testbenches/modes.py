@@ -8,10 +8,10 @@ from cocotb.triggers import Timer
 
 from cubestack.firmware_model.interface.cubesense.fpga import Action, actions, link_shows_enables
 from tests.hdl.cubesense.pair import PREFIXES, STANDBY, PairTestbench, frame
-from tests.hdl.cubesense.settings import MCU_ADDRESSING
+from tests.hdl.cubesense.reference import MCU_ADDRESSING
 from tests.hdl.harness.camera import picture
-from tests.hdl.harness.instants import ODD, wait
 from tests.hdl.harness.testbench import checked_test, timed_test
+from tests.hdl.harness.timing import ODD, wait
 from tests.hdl.harness.watching import disturb_in_standby, levels
 
 #: Idle times in ps, from a glitch to a few clocks.

@@ -5,8 +5,9 @@ from typing import Any
 
 import cocotb
 
-from tests.hdl.cubesense.settings import READ_OUT, clock
-from tests.hdl.harness.geometry import GEOMETRY
+from tests.hdl.cubesense.reference import READ_OUT
+from tests.hdl.harness.reference import GEOMETRY
+from tests.hdl.harness.timing import clock
 
 COLUMNS, ROWS = READ_OUT.columns, READ_OUT.rows
 

@@ -5,10 +5,9 @@ import random
 from itertools import product
 
 from tests.hdl.cubesense.pair import OTHER, PairTestbench, frame, window_of, with_sun
-from tests.hdl.cubesense.reference import NOT_FOUND, SIDES
-from tests.hdl.cubesense.settings import READ_OUT
+from tests.hdl.cubesense.reference import NOT_FOUND, READ_OUT, SIDES
 from tests.hdl.harness.camera import picture
-from tests.hdl.harness.geometry import GEOMETRY
+from tests.hdl.harness.reference import GEOMETRY
 from tests.hdl.harness.testbench import checked_test
 
 COLUMNS, ROWS = READ_OUT.columns, READ_OUT.rows

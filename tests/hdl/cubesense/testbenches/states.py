@@ -10,10 +10,9 @@ from cubestack.firmware_model.interface.cubesense.fpga import ADDRESSING_COMMAND
 from tests.hdl.coverage.cubesense import TOP
 from tests.hdl.coverage.points import GROUPS
 from tests.hdl.cubesense.pair import OTHER, PairTestbench, frame, gap
-from tests.hdl.cubesense.settings import MCU_ADDRESSING, READ_OUT
+from tests.hdl.cubesense.reference import MCU_ADDRESSING, READ_OUT
 from tests.hdl.harness.camera import flat, line, lines, picture
-from tests.hdl.harness.geometry import GEOMETRY
-from tests.hdl.harness.reference import Tick
+from tests.hdl.harness.reference import GEOMETRY, Tick
 from tests.hdl.harness.testbench import checked_test
 
 COLUMNS, ROWS, GAP = READ_OUT.columns, READ_OUT.rows, READ_OUT.frame_gap

@@ -7,9 +7,9 @@ from typing import Any
 
 import cocotb
 
-from tests.hdl.cubesense.reference import NOT_FOUND
-from tests.hdl.cubesense.settings import READ_OUT, clock
-from tests.hdl.harness.geometry import GEOMETRY
+from tests.hdl.cubesense.reference import NOT_FOUND, READ_OUT
+from tests.hdl.harness.reference import GEOMETRY
+from tests.hdl.harness.timing import clock
 
 COLUMNS, ROWS = READ_OUT.columns, READ_OUT.rows
 BRIGHT, DARK = (200, 201, 255), (0, 199, 128)

@@ -5,10 +5,9 @@ from collections.abc import Iterable
 
 import cocotb
 
-from tests.hdl.cubestar.published import PublishedTestbench
+from tests.hdl.cubestar.board import PublishedTestbench
 from tests.hdl.harness.camera import flat, frame, line, lines, picture
-from tests.hdl.harness.geometry import GEOMETRY
-from tests.hdl.harness.reference import Tick
+from tests.hdl.harness.reference import GEOMETRY, Tick
 from tests.hdl.harness.testbench import checked_test
 from tests.hdl.harness.watching import stays_in_the_picture
 

@@ -8,9 +8,8 @@ from cocotb.triggers import Timer
 from tests.hdl.cubestar.next_version import MEMORY, BusTestbench
 from tests.hdl.harness.any_top import TESTBENCH
 from tests.hdl.harness.camera import picture
-from tests.hdl.harness.instants import ODD, wait
-from tests.hdl.harness.sram import SLOWEST_ACCESS
 from tests.hdl.harness.testbench import checked_test
+from tests.hdl.harness.timing import ODD, SLOWEST_ACCESS, wait
 from tests.hdl.harness.watching import levels
 
 

@@ -6,7 +6,7 @@ from typing import Any
 import cocotb
 from cocotb.triggers import First, RisingEdge, Timer
 
-from tests.hdl.harness.geometry import GEOMETRY
+from tests.hdl.harness.reference import GEOMETRY
 from tests.hdl.harness.watching import levels
 
 

@@ -9,9 +9,9 @@ from typing import Any
 import cocotb
 from cocotb.triggers import FallingEdge, Timer
 
-from tests.hdl.cubestar.published import PublishedTestbench
+from tests.hdl.cubestar.board import PublishedTestbench
 from tests.hdl.harness.camera import flat, frame, lines, picture
-from tests.hdl.harness.geometry import GEOMETRY
+from tests.hdl.harness.reference import GEOMETRY
 from tests.hdl.harness.testbench import checked_test, timed_test
 from tests.hdl.harness.watching import disturb_in_standby, levels
 

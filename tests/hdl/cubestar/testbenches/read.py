@@ -8,11 +8,11 @@ import cocotb
 from cocotb.triggers import FallingEdge, RisingEdge
 
 from tests.hdl.coverage.cubestar import STOPPED
-from tests.hdl.cubestar.published import PublishedTestbench
+from tests.hdl.cubestar.board import PublishedTestbench
 from tests.hdl.harness.camera import frame, picture
-from tests.hdl.harness.geometry import GEOMETRY
-from tests.hdl.harness.instants import ODD, wait
+from tests.hdl.harness.reference import GEOMETRY
 from tests.hdl.harness.testbench import checked_test, timed_test
+from tests.hdl.harness.timing import ODD, wait
 
 
 @timed_test

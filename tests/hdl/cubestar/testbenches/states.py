@@ -8,8 +8,7 @@ from tests.hdl.coverage.points import GROUPS
 from tests.hdl.cubestar.board import CubeStarTestbench
 from tests.hdl.harness.any_top import TESTBENCH, works
 from tests.hdl.harness.camera import flat, frame, line, lines, picture, vsync
-from tests.hdl.harness.geometry import GEOMETRY
-from tests.hdl.harness.reference import Tick
+from tests.hdl.harness.reference import GEOMETRY, Tick
 from tests.hdl.harness.testbench import checked_test
 
 COLUMNS, ROWS = GEOMETRY

@@ -7,10 +7,9 @@ a test asserts besides says in plain words what that must have come to.
 import random
 from typing import Any
 
-from tests.hdl.cubestar.published import PublishedTestbench
+from tests.hdl.cubestar.board import PublishedTestbench
 from tests.hdl.harness.camera import flat, frame, line, lines, picture, vsync
-from tests.hdl.harness.geometry import GEOMETRY
-from tests.hdl.harness.reference import Tick
+from tests.hdl.harness.reference import GEOMETRY, Tick
 from tests.hdl.harness.testbench import checked_test, timed_test
 
 COLUMNS, ROWS = GEOMETRY
