@@ -1,5 +1,6 @@
 """Bugs planted by hand in the source of the designs: the tier of each top that has one finds it."""
 
+import re
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -31,152 +32,103 @@ class Bug:
 
 
 STAR = "cubestar"
-SHARED, DOUBLE, BOARDS = (f"cubestar-{name}" for name in ("shared", "double", "boards"))
-PAIR, ADDRESSING = "cubesense-pair", "cubesense-pair-addressing"
-WRITERS = (STAR, SHARED, DOUBLE, PAIR)
-
-#: Address of a picture's last pixel, in a top of CubeStar.
-_LAST = "((self.rows - 1) << (self.columns - 1).bit_length()) + self.columns - 1"
-
-#: By kind: title, module and tops of each; the text that it replaces, and the wrong one.
-_BY_KIND = {
-    "off by one": {
-        ("a row ends a column early", "blocks.counters", (*WRITERS, BOARDS)): (
-            "column == self._columns - 1",
-            "column == self._columns - 2",
-        ),
-        ("a frame has a row more", "blocks.counters", WRITERS): (
-            "row == self._rows - 1",
-            "row == self._rows % (1 << len(row))",
-        ),
-        ("a nadir scan's line ends early", "cubesense.nadir_scan", (PAIR,)): (
-            "size.rows - 1, size.columns - 1",
-            "size.rows - 2, size.columns - 1",
-        ),
-        ("the Sun window starts a column too far right", "cubesense.sun_window", (PAIR,)): (
-            'right, last_column = self._position(m, "right", size.window_left, in_window)',
-            'right, last_column = self._position(m, "right", size.window_left - 1, in_window)',
-        ),
-        ("a gap is one clock shorter", "blocks.frames", (PAIR,)): (
-            "low_clocks == self._clocks",
-            "low_clocks == self._clocks - 1",
-        ),
-    },
-    "swapped condition": {
-        ("a line is taken while HSYNC is low", "blocks.frames", WRITERS): (
-            "                self.hsync\n                & self.vsync\n",
-            "                ~self.hsync\n                & self.vsync\n",
-        ),
-        ("the address multiplexer's sides", "cubestar.top", (STAR,)): (
-            "Mux(self.RNW, reader.address, writer.address)",
-            "Mux(self.RNW, writer.address, reader.address)",
-        ),
-        ("reading and writing on the bus", "blocks.bus_port", (SHARED, DOUBLE, BOARDS)): (
-            "self.writing.eq(self.selected & self.re_n & ~self.we_n)",
-            "self.writing.eq(self.selected & ~self.we_n)",
-        ),
-        ("the direction across the link", "cubesense.dataflow", (PAIR,)): (
-            "(self.rnw, command.rnw),",
-            "(self.rnw ^ (self.shift & ~self.edge), command.rnw),",
-        ),
-    },
-    "missing reset": {
-        ("a store that begins inside of a line takes it", "blocks.frames", (STAR,)): (
-            "between_lines_seen = Signal()",
-            "between_lines_seen = Signal(reset_less=True)",
-        ),
-        ("rows are counted on", "blocks.counters", (STAR, PAIR)): (
-            "row = Signal(range(self._rows))",
-            "row = Signal(range(self._rows), reset_less=True)",
-        ),
-        ("a short last row is not forgotten", "blocks.frames", (STAR,)): (
-            "frame_full = Signal()  # the",
-            "frame_full = Signal(reset_less=True)  # the",
-        ),
-        ("the reader goes on where it was", "cubestar.top", (STAR,)): (
-            'ResetSignal("dclk").eq(~reading)',
-            'ResetSignal("dclk").eq(0)',
-        ),
-        ("the address latch keeps what it has", "blocks.bus_port", ("cubestar-shared-latch",)): (
-            'ResetSignal("ale").eq(~self.on)',
-            'ResetSignal("ale").eq(0)',
-        ),
-        ("a scan goes on where it was", "cubesense.nadir_scan", (PAIR,)): (
-            "vertical = Signal()",
-            "vertical = Signal(reset_less=True)",
-        ),
-        ("a taken address outlives standby", "cubesense.reader", (ADDRESSING,)): (
-            "picture_wanted = self.picture | self.addressing",
-            "picture_wanted = self.picture | self.addressing | ~(self.scan | self.window)",
-        ),
-    },
-    "wrong bank": {
-        ("BANK is inverted", "cubestar.top", (STAR,)): (
-            "bank.eq(self.BANK)",
-            "bank.eq(~self.BANK)",
-        ),
-        ("BANK is not latched", "cubestar.top", (STAR,)): (
-            "m.d.enable += bank.eq(self.BANK)",
-            "m.d.comb += bank.eq(self.BANK)",
-        ),
-        ("BANK is not latched", "cubestar.shared_top", (SHARED, BOARDS)): (
-            "m.d.enable += bank.eq(self.BANK)",
-            "m.d.comb += bank.eq(~self.BANK)",
-        ),
-        ("the other memory is stored in", "cubestar.double_top", (DOUBLE,)): (
-            "m.d.start += into.eq(self.INTO)",
-            "m.d.start += into.eq(~self.INTO)",
-        ),
-        ("own and other sensor's order", "cubesense.top", (PAIR,)): (
-            "own_edge, other_edge = orders if is_sun else orders[::-1]",
-            "own_edge, other_edge = orders[::-1] if is_sun else orders",
-        ),
-        ("the Sun is looked for in the other camera's picture", "cubesense.top", (PAIR,)): (
-            "sun_writer = own_writer if is_sun else link_writer",
-            "sun_writer = link_writer if is_sun else own_writer",
-        ),
-    },
-    "late ACK": {
-        ("one pixel clock", "blocks.frames", WRITERS): (
-            "self.ack.eq(self.ack | (storing_last_column & counter.last_row)),",
-            "(late := Signal()).eq(storing_last_column & counter.last_row),\n"
-            "            self.ack.eq(self.ack | late),",
-        )
-    },
-    "early ACK": {
-        ("a row", "blocks.frames", WRITERS): (
-            "self.ack.eq(self.ack | (storing_last_column & counter.last_row)),",
-            "self.ack.eq(self.ack | (self.store & counter.last_row)),",
-        ),
-        ("before the last write pulse", "cubestar.top", (STAR,)): (
-            "writer = self._add_writer(m, storing)\n",
-            "writer = self._add_writer(m, storing)\n        m.d.comb += "
-            f"self.ACK.eq(writer.ack | (writer.store & (writer.address == {_LAST})))\n",
-        ),
-        ("before the last write pulse", "cubesense.top", (PAIR,)): (
-            "self.ACK.eq(own_ack | link_writer.ack)",
-            "self.ACK.eq(own_ack | link_writer.ack | (own_writer.store & (own_writer.address"
-            f" == {_LAST.replace('self.', 'self.read_out.')})))",
-        ),
-    },
-    "extra WE pulse": {
-        ("after the last pixel", "blocks.frames", WRITERS): (
-            "self.store.eq(accept),",
-            "self.store.eq(accept | (storing_last_column & counter.last_row)),",
-        ),
-        ("after a row", "blocks.frames", WRITERS): ("                & ~storing_last_column\n", ""),
-        ("in the clock's high half", "cubestar.top", (STAR,)): (
-            "self.SRAM_WE_N.eq(~writer.store | self.PIXCLK)",
-            "self.SRAM_WE_N.eq(~writer.store)",
-        ),
-    },
+TOPS = {
+    "star": STAR,
+    **{name: f"cubestar-{name}" for name in ("shared", "double", "boards", "shared-latch")},
+    "pair": "cubesense-pair",
+    "addressing": "cubesense-pair-addressing",
 }
 
-BUGS = tuple(
-    Bug(kind, title, module, *texts, tops)
-    for kind, bugs in _BY_KIND.items()
-    for (title, module, tops), texts in bugs.items()
-)
+#: By kind: title, module and tops of each; its text, with ``{{right->wrong}}`` in it. ``LAST`` is
+#: that the picture's last pixel is stored.
+_TABLE = r"""
+off by one
+  a row ends a column early | blocks.counters | star shared double pair boards
+    column == self._columns - {{1->2}}
+  a frame has a row more | blocks.counters | star shared double pair
+    row == self._rows {{- 1->% (1 << len(row))}}
+  a nadir scan's line ends early | cubesense.nadir_scan | pair
+    size.rows - {{1->2}}, size.columns - 1
+  the Sun window starts a column too far right | cubesense.sun_window | pair
+    self._position(m, "right", size.window_left{{-> - 1}}, in_window)
+  a gap is one clock shorter | blocks.frames | pair
+    low_clocks == self._clocks{{-> - 1}}
+swapped condition
+  a line is taken while HSYNC is low | blocks.frames | star shared double pair
+    {{->~}}self.hsync\n                & self.vsync\n
+  the address multiplexer's sides | cubestar.top | star
+    Mux(self.RNW, {{reader.address, writer.address->writer.address, reader.address}})
+  reading and writing on the bus | blocks.bus_port | shared double boards
+    self.writing.eq(self.selected & {{self.re_n & ->}}~self.we_n)
+  the direction across the link | cubesense.dataflow | pair
+    (self.rnw{{-> ^ (self.shift & ~self.edge)}}, command.rnw),
+missing reset
+  a store that begins inside of a line takes it | blocks.frames | star
+    between_lines_seen = Signal({{->reset_less=True}})
+  rows are counted on | blocks.counters | star pair
+    row = Signal(range(self._rows){{->, reset_less=True}})
+  a short last row is not forgotten | blocks.frames | star
+    frame_full = Signal({{->reset_less=True}})  # the
+  the reader goes on where it was | cubestar.top | star
+    ResetSignal("dclk").eq({{~reading->0}})
+  the address latch keeps what it has | blocks.bus_port | shared-latch
+    ResetSignal("ale").eq({{~self.on->0}})
+  a scan goes on where it was | cubesense.nadir_scan | pair
+    vertical = Signal({{->reset_less=True}})
+  a taken address outlives standby | cubesense.reader | addressing
+    picture_wanted = self.picture | self.addressing{{-> | ~(self.scan | self.window)}}
+wrong bank
+  BANK is inverted | cubestar.top | star
+    bank.eq({{self.BANK->~self.BANK}})
+  BANK is not latched | cubestar.top | star
+    {{m.d.enable->m.d.comb}} += bank.eq(self.BANK)
+  BANK is not latched | cubestar.shared_top | shared boards
+    m.d.{{enable->comb}} += bank.eq({{->~}}self.BANK)
+  the other memory is stored in | cubestar.double_top | double
+    m.d.start += into.eq({{self.INTO->~self.INTO}})
+  own and other sensor's order | cubesense.top | pair
+    own_edge, other_edge = orders{{->[::-1]}} if is_sun else orders{{[::-1]->}}
+  the Sun is looked for in the other camera's picture | cubesense.top | pair
+    sun_writer = {{own->link}}_writer if is_sun else {{link->own}}_writer
+late ACK
+  one pixel clock | blocks.frames | star shared double pair
+    {{self.ack.eq(self.ack | (->(late := Signal()).eq(}}storing_last_column & counter.last_row)\
+    {{)->, self.ack.eq(self.ack | late)}},
+early ACK
+  a row | blocks.frames | star shared double pair
+    self.ack.eq(self.ack | ({{storing_last_column->self.store}} & counter.last_row)),
+  before the last write pulse | cubestar.top | star
+    writer = self._add_writer(m, storing){{->; m.d.comb += self.ACK.eq(writer.ack | (writer.LAST))}}
+  before the last write pulse | cubesense.top | pair
+    self.ACK.eq(own_ack | link_writer.ack{{-> | (own_writer.LAST)}})
+extra WE pulse
+  after the last pixel | blocks.frames | star shared double pair
+    self.store.eq(accept{{-> | (storing_last_column & counter.last_row)}}),
+  after a row | blocks.frames | star shared double pair
+    {{                & ~storing_last_column\n->}}
+  in the clock's high half | cubestar.top | star
+    self.SRAM_WE_N.eq(~writer.store{{ | self.PIXCLK->}})
+"""
+
+
+def _bugs() -> Iterator[Bug]:
+    kind = title = module = tops = ""
+    for line in re.sub(r"\\\n +", "", _TABLE).strip().splitlines():
+        text = line.lstrip()
+        if text == line:
+            kind = text
+        elif " | blocks." in line or " | cube" in line:
+            title, module, tops = text.split(" | ")
+        else:
+            size = "self.read_out" if module == "cubesense.top" else "self"
+            last = f"(({size}.rows - 1) << ({size}.columns - 1).bit_length()) + {size}.columns - 1"
+            text = re.sub(r"(\w+)\.LAST", rf"\1.store & (\1.address == {last})", text)
+            text = text.replace(r"\n", "\n")
+            texts = [re.sub(r"{{(.*?)->(.*?)}}", way, text, flags=re.S) for way in (r"\1", r"\2")]
+            yield Bug(kind, title, module, *texts, tuple(TOPS[top] for top in tops.split()))
+
+
+BUGS = tuple(_bugs())
 
 
 @contextmanager

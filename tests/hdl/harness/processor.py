@@ -77,7 +77,7 @@ USED_BITS = GEOMETRY.position_bits + 1
 
 
 class Ebi:
-    """Bus master with 24 address and 8 data bits. Lines that it does not drive are unknown; bits of no use are random."""
+    """Bus master, 24 address and 8 data bits. Lines not driven are unknown; unused bits random."""
 
     def __init__(self, dut: Any, *selects: str, timing: Timing = ANY) -> None:
         self._dut = dut
