@@ -82,14 +82,11 @@ def test_changes_elsewhere_keep_the_selection(
 
 
 def test_mirrored_test_file_comes_first() -> None:
+    """Then importing ones, then neighbours."""
     found = files_for(Path("firmware_model/attitude/quest.py"))
     assert found[0] == Path("tests/firmware_model/attitude/test_quest.py")
     assert {file.parent for file in found} == {Path("tests/firmware_model/attitude")}
-
-
-def test_importing_test_files_come_before_neighbours() -> None:
-    found = files_for(Path("firmware_model/attitude/quest.py"))[1:]
-    imports = ["attitude.quest import" in (ROOT / file).read_text("utf-8") for file in found]
+    imports = ["attitude.quest import" in (ROOT / file).read_text("utf-8") for file in found[1:]]
     assert any(imports)
     assert imports == sorted(imports, reverse=True)
 

@@ -28,6 +28,29 @@ from cubestack.emulator.sim.virtual_time import Kernel
 ALL_BYTES = bytes(range(256))
 LOOPBACK = "127.0.0.1"
 TIMEOUT_S = 20.0  # of a client that waits for what must come
+NS_PER_MS = 1_000_000
+ORIGIN_NS = 123_456_789_012_345  # wall time at the start of a test
+
+
+class Wall:
+    """Wall time of the test. Attributes: the waits so far in s, and the ns of odd ones."""
+
+    def __init__(self) -> None:
+        self.ns = ORIGIN_NS
+        self.waits: list[float] = []
+        self.during_wait: dict[int, int] = {}
+
+    def clock(self) -> int:
+        self.ns += 10_000
+        return self.ns
+
+    def wait(self, _watched: Any, timeout_s: float) -> None:
+        self.ns += self.during_wait.get(len(self.waits), int(timeout_s * 1e9))
+        self.waits.append(timeout_s)
+
+    @property
+    def ms(self) -> float:
+        return (self.ns - ORIGIN_NS) / NS_PER_MS
 
 
 class Device:

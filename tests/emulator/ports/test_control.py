@@ -18,6 +18,8 @@ from cubestack.emulator.ports.pace import Pace
 from cubestack.emulator.ports.realtime import RealtimeScheduler
 from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S, Kernel
 
+from .conftest import Wall
+
 SOON_S = 20.0
 
 
@@ -134,16 +136,16 @@ def test_no_catching_up_after_a_jump(running: Running) -> None:
 
 @pytest.mark.parametrize("speed", [0.5, 20.0])
 def test_speed_is_kept_on_a_simulated_wall_clock(speed: float) -> None:
-    wall, kernel = [10**15], Kernel()
+    wall, kernel = Wall(), Kernel()
 
-    def wait(_watched: Any, timeout_s: float) -> None:
-        wall[0] += max(1000, int(timeout_s * 1e9))
-        if wall[0] > 10**15 + 2 * 10**9:
+    def wait(watched: Any, timeout_s: float) -> None:
+        wall.wait(watched, timeout_s)
+        if wall.ms > 2000:
             scheduler.stop()
 
     port = ControlPort(kernel)
     scheduler = RealtimeScheduler(
-        kernel, [port], lambda: False, Pace(kernel, "real", lambda: wall[0]), wait=wait
+        kernel, [port], lambda: False, Pace(kernel, "real", wall.clock), wait=wait
     )
     port.scheduler = scheduler
     port.set_pace("real", speed)

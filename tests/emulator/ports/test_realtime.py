@@ -16,29 +16,7 @@ from cubestack.emulator.ports.pace import Pace
 from cubestack.emulator.ports.realtime import IDLE_S, SLICE_S, RealtimeScheduler
 from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S, Kernel
 
-NS_PER_MS = 1_000_000
-ORIGIN_NS = 123_456_789_012_345
-
-
-class Wall:
-    """Wall time of the test. Attributes: the waits so far in s, and the ns of odd ones."""
-
-    def __init__(self) -> None:
-        self.ns = ORIGIN_NS
-        self.waits: list[float] = []
-        self.during_wait: dict[int, int] = {}
-
-    def clock(self) -> int:
-        self.ns += 10_000
-        return self.ns
-
-    def wait(self, _watched: Any, timeout_s: float) -> None:
-        self.ns += self.during_wait.get(len(self.waits), int(timeout_s * 1e9))
-        self.waits.append(timeout_s)
-
-    @property
-    def ms(self) -> float:
-        return (self.ns - ORIGIN_NS) / NS_PER_MS
+from .conftest import NS_PER_MS, Wall
 
 
 class FakePort(Endpoint):

@@ -28,7 +28,7 @@ from cubestack.firmware_model.formats import linux_i2c
 
 from ..bus.ends import Memory
 from ..i2cdev.conftest import packed
-from .conftest import ALL_BYTES, TIMEOUT_S, Client, Device, open_client, open_port, served
+from .conftest import ALL_BYTES, TIMEOUT_S, Client, Device, Wall, open_client, open_port, served
 
 # pyserial calls setDaemon and setName of a thread.
 pytestmark = pytest.mark.filterwarnings("ignore:set(Daemon|Name):DeprecationWarning")
@@ -132,7 +132,6 @@ def test_plain_shell(port, device, path):
         assert run("sh", "-c", script) == b"hello"
 
 
-NS_PER_MS = 1_000_000
 SPARE_BYTES = 1_000_000
 ADDRESS = 0x1A
 HALF_A_FRAME = b"\x1f\x7f\x14"
@@ -143,22 +142,15 @@ ROLES = {"flood": 1, "unread": 2000, "stopped": 1, "polite": 1}
 
 def serve(kernel: Kernel, ports, busy, waits: int, step: Callable[[int], None]) -> None:
     """A step in each wait; wall time passes in waits, as rounded by ``wait_ready``."""
-    ns = number = 0
+    wall = Wall()
 
-    def clock() -> int:
-        nonlocal ns
-        ns += 1000
-        return ns
-
-    def wait(_watched, timeout_s: float) -> None:
-        nonlocal ns, number
-        number += 1
-        step(number)
-        ns += max(NS_PER_MS, int(timeout_s * 1e9))
-        if number == waits:
+    def wait(watched, timeout_s: float) -> None:
+        step(len(wall.waits) + 1)
+        wall.wait(watched, max(0.001, timeout_s))
+        if len(wall.waits) == waits:
             scheduler.stop()
 
-    scheduler = RealtimeScheduler(kernel, ports, busy, Pace(kernel, "real", clock), wait=wait)
+    scheduler = RealtimeScheduler(kernel, ports, busy, Pace(kernel, "real", wall.clock), wait=wait)
     scheduler.run()
 
 
