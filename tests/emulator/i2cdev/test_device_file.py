@@ -178,11 +178,6 @@ def test_combined_errors(ask: Ask, messages, code):
     assert rdwr(ask, *messages) == (-code, [])
 
 
-def test_limits_are_reached(ask: Ask):
-    assert rdwr(ask, *[linux.RdwrMessage(0x1A, READ, 1)] * 42)[0] == 42
-    assert len(rdwr(ask, linux.RdwrMessage(0x1A, READ, 8192))[1][0]) == 8192
-
-
 def test_length_from_the_device(ask: Ask):
     messages = (
         linux.RdwrMessage(0x1A, 0, 1, b"\x05"),

@@ -41,10 +41,6 @@ def assert_fresh(port, device, client) -> None:
     assert client.read(5) == b"fresh"
 
 
-def test_transparent_both_ways(port, device, connect):
-    assert_transparent(port, device, connect())
-
-
 @pytest.mark.parametrize("leave", ["close", "reset"])
 @pytest.mark.parametrize("unread", [1, 100, 60_000, 500_000])
 def test_client_receives_no_data_of_its_predecessor(port, device, connect, unread, leave):
