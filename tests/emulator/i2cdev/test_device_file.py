@@ -45,9 +45,6 @@ def rdwr(ask: Ask, *messages: linux.RdwrMessage) -> tuple[int, list[bytes]]:
     return result, linux.split_rdwr(messages, data) if result >= 0 else []
 
 
-# --- settings -----------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("number", [linux.Ioctl.SLAVE, linux.Ioctl.SLAVE_FORCE])
 @pytest.mark.parametrize(
     ("ten_bit", "address", "result"),
@@ -77,9 +74,6 @@ def test_the_timeout_is_in_units_of_ten_milliseconds(ask: Ask, adapter: I2cAdapt
     ioctl(ask, linux.Ioctl.TIMEOUT, 3)
     ioctl(ask, linux.Ioctl.RETRIES, 4)
     assert (adapter.timeout_ps, adapter.retries) == (30 * 10**9, 4)
-
-
-# --- read and write -----------------------------------------------------------------------------
 
 
 def test_write_then_read(ask: Ask, registers):
@@ -135,9 +129,6 @@ def test_stretched_clock_delays(ask: Ask, kernel, registers):
     assert ask(linux.Call.READ, linux.pack_read(1)) == (-errno.ETIMEDOUT, b"")
 
 
-# --- combined transfers -------------------------------------------------------------------------
-
-
 def test_combined(ask: Ask, registers):
     messages = (
         linux.RdwrMessage(0x1A, 0, 2, b"\x10\x99"),
@@ -187,9 +178,6 @@ def test_length_from_the_device(ask: Ask):
     assert rdwr(ask, *messages) == (3, [b"", bytes([5, 6, 7, 8, 9, 10]), b"\x0b"])
 
 
-# --- SMBus --------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("direction", "size", "data"),
     [
@@ -229,9 +217,6 @@ def test_checksums_are_switched(ask: Ask, registers):
     # Reading, the device's next byte is no checksum of those before it.
     read = linux.pack_smbus(linux.SmbusCall(1, 0x40, linux.SmbusSize.BYTE_DATA, bytes(34)))
     assert ask(linux.Call.SMBUS, read) == (-errno.EBADMSG, b"")
-
-
-# --- nonsense -----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

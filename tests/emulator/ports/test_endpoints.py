@@ -130,9 +130,6 @@ def test_client_that_never_reads_wakes_nobody(port, device, connect):
     assert port.congested
 
 
-# --- pseudo-terminals --------------------------------------------------------------------------
-
-
 @a_pty
 def test_pty_link_leads_to_a_terminal(port, path):
     assert path.is_symlink()
@@ -261,9 +258,6 @@ def test_pty_replaces_the_link_of_a_run_that_died_and_removes_its_own_only(devic
     path.write_text("somebody else's")
     endpoint.close()
     assert path.read_text() == "somebody else's"
-
-
-# --- TCP ---------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

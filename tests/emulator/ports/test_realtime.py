@@ -84,9 +84,6 @@ def bench() -> TimedPort:
     return TimedPort()
 
 
-# --- real pace ---------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("pace", ["real", "fast"])
 def test_idle_scheduler_sleeps(bench, pace):
     bench.run(pace, 10_000)
@@ -150,9 +147,6 @@ def test_short_delay_is_not_reported(bench):
     assert not bench.reports
 
 
-# --- fast pace ---------------------------------------------------------------------------------
-
-
 def test_work_runs_ahead_of_wall_time(bench):
     ticks = bench.tick(10 * PS_PER_MS, until_ps=100 * PS_PER_S)
     bench.busy = lambda: bench.kernel.now < 100 * PS_PER_S
@@ -209,9 +203,6 @@ def test_scheduler_sleeps_while_a_busy_device_has_no_events(bench):
     assert min(bench.wall.waits) == IDLE_S
 
 
-# --- the end, and the real clock ---------------------------------------------------------------
-
-
 def test_stop_before_the_start():
     scheduler = RealtimeScheduler(Kernel(), [], lambda: False, Pace(Kernel(), "real"))
     scheduler.stop()
@@ -264,9 +255,6 @@ def test_waiting_ends_with_input_with_room_for_output_or_in_time(sent, events, t
         theirs.send(sent)
         realtime.wait_ready([(ours.fileno(), events)], timeout_s)  # hangs, if it does not
     realtime.wait_ready([], 0.0)
-
-
-# --- halted by a debugger ----------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("pace", ["real", "fast"])

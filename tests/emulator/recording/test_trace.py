@@ -11,14 +11,14 @@ from hypothesis import strategies as st
 
 from cubestack.emulator.boards.cubestar.wiring import cubestar_wiring
 from cubestack.emulator.bus.i2c import I2cBus, I2cMessage
-from cubestack.emulator.bus.uart import LineFormat, Uart
+from cubestack.emulator.bus.line_format import LineFormat
 from cubestack.emulator.recording.scope import Scope
 from cubestack.emulator.recording.trace import VcdTrace
 from cubestack.emulator.rtl.contract import RtlEngine
 from cubestack.emulator.rtl.factory import make_engine
 from cubestack.emulator.sim.virtual_time import Kernel
 
-from ..bus.ends import Memory
+from ..bus.ends import Desk, Memory
 from .vcd import read
 
 BAUD = 57_600
@@ -38,10 +38,9 @@ def received(levels: list[tuple[int, object]]) -> bytes:
 
 @given(st.lists(st.tuples(st.integers(0, 10**9), st.binary(max_size=5)), max_size=4))
 def test_drawn_levels_are_the_bytes(writes):
-    kernel, stream = Kernel(), io.StringIO()
-    uart = Uart(
-        kernel, BAUD, lambda byte: uart.send(bytes([byte ^ 0xFF])), lambda: None, silence_bytes=10
-    )
+    desk, stream = Desk(BAUD), io.StringIO()
+    kernel, uart = desk.kernel, desk.uart
+    uart.on_byte = lambda byte: uart.send(bytes([byte ^ 0xFF]))
     trace = VcdTrace(stream, "echo", kernel, {"uart": uart})
     for pause_ps, data in writes:
         kernel.advance_to(kernel.now + pause_ps)
@@ -55,12 +54,11 @@ def test_drawn_levels_are_the_bytes(writes):
 
 
 def test_characters_of_another_form_are_counted_in_a_word():
-    kernel, stream = Kernel(), io.StringIO()
-    uart = Uart(kernel, BAUD, lambda _byte: None, lambda: None, silence_bytes=10)
-    trace = VcdTrace(stream, "board", kernel, {"uart": uart})
-    uart.host_form = LineFormat(BAUD, parity="S")
-    uart.host_writes(b"bc")
-    kernel.run()
+    desk, stream = Desk(BAUD), io.StringIO()
+    trace = VcdTrace(stream, "board", desk.kernel, {"uart": desk.uart})
+    desk.uart.host_form = LineFormat(BAUD, parity="S")
+    desk.uart.host_writes(b"bc")
+    desk.kernel.run()
     trace.close()
     text = stream.getvalue()
     changes = read(io.BytesIO(text.encode()))
@@ -93,16 +91,15 @@ def test_probes_and_transfers():
 
 
 def test_trace_leaves_nothing_behind():
-    kernel = Kernel()
-    uart = Uart(kernel, BAUD, lambda _byte: None, lambda: None, silence_bytes=10)
-    bus = I2cBus(kernel)
-    trace = VcdTrace(io.StringIO(), "board", kernel, {"uart": uart})
+    desk = Desk(BAUD)
+    bus = I2cBus(desk.kernel)
+    trace = VcdTrace(io.StringIO(), "board", desk.kernel, {"uart": desk.uart})
     trace.listen(bus)
-    assert uart.taps
+    assert desk.uart.taps
     assert bus.taps
     trace.close()
-    assert uart.taps == bus.taps == []
-    assert "step" not in vars(kernel)
+    assert desk.uart.taps == bus.taps == []
+    assert "step" not in vars(desk.kernel)
 
 
 PINS = ("DCLK", "DATA", "SRAM_A", "SRAM_OE_N")

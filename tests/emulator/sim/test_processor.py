@@ -102,9 +102,6 @@ def test_main_starts_after_the_boot_time(desk_of):
     assert desk.causes == [POWER_ON]
 
 
-# --- pins --------------------------------------------------------------------------------------
-
-
 def test_pin_is_driven_when_the_work_before_it_is_done(desk_of):
     desk = desk_of(script(10, req.SetPin("ENABLE", 1), req.SetPin("RNW", 1))).run()
     rises = [((time // PS_PER_US) - BOOT_US, pin, level) for time, pin, level in desk.engine.pins]
@@ -152,9 +149,6 @@ def test_engine_never_runs_past_an_event_and_looks_ahead_so_far_only(desk_of):
         time = (us + BOOT_US) * PS_PER_US
         assert not [burst for burst in bursts if burst[0] < time < burst[1]]
     assert max(end - start for start, end in bursts) == LOOK_AHEAD_PS
-
-
-# --- camera bus, reset, mistakes ---------------------------------------------------------------
 
 
 @pytest.mark.parametrize("answer", [b"\x12", None])
@@ -242,9 +236,6 @@ def test_program_that_returns(desk_of):
         desk.run()
 
 
-# --- sleep -------------------------------------------------------------------------------------
-
-
 def test_reports_wake_at_the_deadline_once(desk_of):
     desk = desk_of(script(sleep(500), sleep(900)))
     desk.at(500, desk.processor.wake)
@@ -267,8 +258,6 @@ def test_dozing_is_to_sleep_until_an_interrupt_and_waiting_without_a_deadline(de
     desk.at(2000, desk.processor.wake)
     assert desk.run().log[2:] == [(2000, True)]
 
-
-# --- transfer loop -----------------------------------------------------------------------------
 
 CYCLES = 38
 HZ = 48_000_000  # 38 cycles are 791 666 2/3 ps

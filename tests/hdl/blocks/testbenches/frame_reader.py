@@ -7,16 +7,17 @@ import cocotb
 from cocotb.triggers import Timer
 
 from tests.hdl.harness.reference import GEOMETRY
+from tests.hdl.harness.timing import some_time
 
 
 async def clock(dut: Any, memory: bytes, reset: int = 0) -> int:
     dut.dclk_clk.value = 0
     dut.dclk_rst.value = reset
-    await Timer(random.randint(1, 50), unit="ns")
+    await some_time()
     dut.memory.value = memory[int(dut.address.value)]
-    await Timer(random.randint(1, 50), unit="ns")
+    await some_time()
     dut.dclk_clk.value = 1
-    await Timer(random.randint(1, 50), unit="ns")
+    await some_time()
     dut.memory.value = random.randrange(256)
     await Timer(1, unit="ns")
     return int(dut.data.value)

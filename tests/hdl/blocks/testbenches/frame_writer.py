@@ -5,10 +5,10 @@ from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import cocotb
-from cocotb.triggers import Timer
 
 from tests.hdl.harness.camera import flat, frame, line, lines, picture, vsync
 from tests.hdl.harness.reference import GEOMETRY, Tick, taken
+from tests.hdl.harness.timing import clock
 
 
 class Seen(NamedTuple):
@@ -19,13 +19,8 @@ class Seen(NamedTuple):
     written: tuple[int, int] | None
 
 
-async def clock(dut: Any, tick: Tick, reset: int = 0) -> Seen:
-    dut.pix_clk.value = 0
-    dut.pix_rst.value = reset
-    dut.pixel.value, dut.hsync.value, dut.vsync.value = tick
-    await Timer(random.randint(1, 50), unit="ns")
-    dut.pix_clk.value = 1
-    await Timer(random.randint(1, 50), unit="ns")
+async def take(dut: Any, tick: Tick, reset: int = 0) -> Seen:
+    await clock(dut, "pix", reset, **tick._asdict())
     store, ack = int(dut.store.value), int(dut.ack.value)
     return Seen(store, ack, (int(dut.address.value), int(dut.data.value)) if store else None)
 
@@ -33,13 +28,13 @@ async def clock(dut: Any, tick: Tick, reset: int = 0) -> Seen:
 async def compare(dut: Any, ticks: Iterable[Tick]) -> bool:
     """Clock the ticks in after a reset, each output as the reference says; whether ACK came."""
     ticks = list(ticks)
-    assert await clock(dut, Tick(255, 1, 1), reset=1) == Seen(0, 0, None)
+    assert await take(dut, Tick(255, 1, 1), reset=1) == Seen(0, 0, None)
     pixels, ack = taken(ticks, GEOMETRY)
     addresses = dict(pixels)
     for index, tick in enumerate(ticks):
         written = (addresses[index], tick.pixel) if index in addresses else None
         expected = Seen(index in addresses, ack is not None and index >= ack, written)
-        assert await clock(dut, tick) == expected
+        assert await take(dut, tick) == expected
     return ack is not None
 
 
