@@ -18,8 +18,7 @@ from cubesense_fpga_i2c.register_table import (
     Register,
     command_byte,
 )
-from tests.hdl.cubesense.reference import SIDES
-from tests.hdl.cubesense.settings import READ_OUT
+from tests.hdl.cubesense.reference import READ_OUT, SIDES
 from tests.hdl.harness.camera import picture
 from tests.hdl.harness.reference import GEOMETRY
 from tests.hdl.harness.testbench import timed_test

@@ -8,8 +8,7 @@ from i2c_bench import STANDBY, I2cBench, read, store
 from cubesense_fpga_i2c.register_table import ADDRESSES, GROUP_ADDRESS, Register
 from cubestack.firmware_model.interface.cubesense.fpga import Action, Actions
 from tests.hdl.cubesense.pair import OTHER, frame
-from tests.hdl.cubesense.reference import NOT_FOUND, SIDES
-from tests.hdl.cubesense.settings import READ_OUT
+from tests.hdl.cubesense.reference import NOT_FOUND, READ_OUT, SIDES
 from tests.hdl.harness.camera import flat, lines, picture
 from tests.hdl.harness.reference import GEOMETRY
 from tests.hdl.harness.testbench import timed_test

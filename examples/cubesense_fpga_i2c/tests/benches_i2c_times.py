@@ -10,8 +10,7 @@ from i2c_bench import STANDBY, I2cBench, read
 from i2c_bus import SPEEDS
 
 from cubesense_fpga_i2c.register_table import ADDRESSES, Register, pointer_bytes
-from tests.hdl.cubesense.reference import SIDES
-from tests.hdl.cubesense.settings import READ_OUT
+from tests.hdl.cubesense.reference import READ_OUT, SIDES
 from tests.hdl.harness.reference import GEOMETRY
 from tests.hdl.harness.testbench import timed_test
 from tests.hdl.harness.timing import now

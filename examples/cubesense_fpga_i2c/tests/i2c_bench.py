@@ -13,8 +13,7 @@ from i2c_model import FpgaModel
 from cubesense_fpga_i2c.register_table import RESET_COMMAND, Register, StatusBits, command_of
 from cubestack.firmware_model.interface.cubesense.fpga import COMMANDS, Action, Actions
 from tests.hdl.cubesense.pair import OTHER, PREFIXES, frame
-from tests.hdl.cubesense.reference import SIDES, Controls, Half, behaviour
-from tests.hdl.cubesense.settings import READ_OUT
+from tests.hdl.cubesense.reference import READ_OUT, SIDES, Controls, Half, behaviour
 from tests.hdl.harness.camera import Camera
 from tests.hdl.harness.reference import GEOMETRY
 from tests.hdl.harness.sram import UNKNOWN, Sram
