@@ -13,6 +13,18 @@ from tests.mutation.trial import ROOT, files_for, near
 HERE = Path("a.py")
 
 
+def record(root: Path, tests: dict[str, float], ran: list[tuple[str, int]], path: Path) -> Reached:
+    """A recorded run: the seconds of tests, and the contexts with the line of ``path`` they ran."""
+    (root / FOLDER).mkdir(parents=True)
+    (root / FOLDER / TIMES).write_text(json.dumps(tests), "utf-8")
+    data = CoverageData(str(root / FOLDER / DATA))
+    for context, line in ran:
+        data.set_context(context)
+        data.add_lines({str(path): [line]})
+    data.write()
+    return Reached(root)
+
+
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
@@ -85,8 +97,9 @@ def test_mirrored_test_file_comes_first() -> None:
     """Then importing ones, then neighbours."""
     found = files_for(Path("firmware_model/attitude/quest.py"))
     assert found[0] == Path("tests/firmware_model/attitude/test_quest.py")
-    assert {file.parent for file in found} == {Path("tests/firmware_model/attitude")}
-    imports = ["attitude.quest import" in (ROOT / file).read_text("utf-8") for file in found[1:]]
+    beside = [file for file in found if file.parent == found[0].parent]
+    assert beside == found[: max(3, len(beside))]
+    imports = ["attitude.quest import" in (ROOT / file).read_text("utf-8") for file in beside[1:]]
     assert any(imports)
     assert imports == sorted(imports, reverse=True)
 
@@ -94,10 +107,8 @@ def test_mirrored_test_file_comes_first() -> None:
 def test_unrecorded_tests_are_run_for_near_modules(tmp_path: Path) -> None:
     own = "tests/firmware_model/attitude/test_quest.py::"
     other = "tests/emulator/bus/test_uart.py::"
-    (tmp_path / FOLDER).mkdir(parents=True)
     recorded = {own + "test_old": 1.0, own + "test_gone": 1.0, other + "test_old[1]": 1.0}
-    (tmp_path / FOLDER / TIMES).write_text(json.dumps(recorded), "utf-8")
-    reached = Reached(tmp_path)
+    reached = record(tmp_path, recorded, [], HERE)
     new = [other + "test_old[2]", own + "test_new"]
     assert reached.update({own + "test_old", other + "test_old[1]", *new}) == new
     assert reached.durations.keys() == {own + "test_old", other + "test_old[1]"}
@@ -106,22 +117,11 @@ def test_unrecorded_tests_are_run_for_near_modules(tmp_path: Path) -> None:
 
 
 def test_mutant_faces_the_tests_that_run_its_line(tmp_path: Path) -> None:
-    (tmp_path / FOLDER).mkdir(parents=True)
     # However many they are, the others are faced as well.
     of_documents = [f"{DOCUMENTS[0]}::test_defaults[{number}]" for number in range(MOST_TESTS)]
     names = "tests/test_a.py::test_f", "test_b.py::test_g", "test_c.py::test_h", *of_documents
-    recorded = dict.fromkeys(names, 1.0)
-    (tmp_path / FOLDER / TIMES).write_text(json.dumps(recorded), "utf-8")
-    data = CoverageData(str(tmp_path / FOLDER / DATA))
-    for context, line in (
-        ("", 1),
-        ("tests/test_a.py::test_f|run", 3),
-        ("test_b.py::test_g|run", 4),
-    ):
-        data.set_context(context)
-        data.add_lines({str(HERE): [line]})
-    data.write()
-    reached = Reached(tmp_path)
+    ran = [("", 1), ("tests/test_a.py::test_f|run", 3), ("test_b.py::test_g|run", 4)]
+    reached = record(tmp_path, dict.fromkeys(names, 1.0), ran, HERE)
     for line, expected in ((3, ["tests/test_a.py::test_f"]), (4, ["test_b.py::test_g"])):
         assert reached.tests(Mutant(HERE, line, line, line, 0, 1, "a", "b"), set()) == expected
     at_import = Mutant(HERE, 1, 1, 1, 0, 1, "a", "b")
@@ -135,13 +135,8 @@ def test_tests_of_the_module_come_first(tmp_path: Path) -> None:
     beside = [f"tests/mutation/test_other.py::test_b[{number}]" for number in range(99)]
     slow, far = "tests/mutation/test_mutants.py::test_slow", "tests/test_far.py::test_c"
     recorded = {slow: 11.0, far: 0.001} | dict.fromkeys(beside, 0.01) | dict.fromkeys(own, 0.02)
-    (tmp_path / FOLDER).mkdir(parents=True)
-    (tmp_path / FOLDER / TIMES).write_text(json.dumps(recorded), "utf-8")
-    path, data = Path("mutation/mutants.py"), CoverageData(str(tmp_path / FOLDER / DATA))
-    for test in recorded:
-        data.set_context(f"{test}|run")
-        data.add_lines({str(path): [1]})
-    data.write()
-    faced = Reached(tmp_path).tests(Mutant(path, 1, 1, 1, 0, 1, "a", "b"), set())
+    path = Path("mutation/mutants.py")
+    reached = record(tmp_path, recorded, [(f"{test}|run", 1) for test in recorded], path)
+    faced = reached.tests(Mutant(path, 1, 1, 1, 0, 1, "a", "b"), set())
     assert set(faced[:99]) == set(own)
     assert 98 < faced.index(beside[0]) < faced.index(slow) < faced.index(far)

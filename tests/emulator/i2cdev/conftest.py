@@ -130,15 +130,12 @@ class Served:
 
     def serve(self) -> None:
         while True:
-            ready = self._ready()
+            ready = any(poll_now(*watched) for watched in self.server.watched())
             self.server.exchange(self.kernel.now)
             if not ready and not self.adapter.busy:
                 return
             while self.adapter.busy:
                 self.kernel.step()
-
-    def _ready(self) -> bool:
-        return any(poll_now(*watched) for watched in self.server.watched())
 
     def wait(self, timeout_s: float) -> None:
         wait_precisely(self.server.watched(), timeout_s)
