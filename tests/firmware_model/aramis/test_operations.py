@@ -72,9 +72,7 @@ def test_lists(light: str, profile: str, hint_deg: float | None) -> None:
 @pytest.mark.parametrize("round_", [False, True])
 def test_a_field(round_: bool) -> None:
     spent, field = meter(), CameraField(round=round_)
-    points = np.column_stack([np.linspace(0, 1279, 40), np.linspace(0, 1023, 40)]).astype(
-        np.float32
-    )
+    points = np.linspace((0, 0), (1279, 1023), 40, dtype=np.float32)
     directions = field.directions(points, spent)
     inside = field.inside(points, spent), field.contains(directions, spent)
     as_on_record(f"AraMiS field: round {round_}", spent, [int(each.sum()) for each in inside])

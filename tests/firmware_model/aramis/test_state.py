@@ -1,11 +1,27 @@
 from typing import Any
 
+import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
+from cubestack.firmware_model.aramis.detection.mask import SpikeRemoval
+from cubestack.firmware_model.aramis.measurement import Measuring, configuration
+from cubestack.firmware_model.aramis.pipeline import VERIFIED, DetectionSettings
 from cubestack.firmware_model.aramis.settings import BODY_PAGE, CONFIG_PAGE, StoredSettings
 from cubestack.firmware_model.aramis.state import Clock, State
-from cubestack.firmware_model.interface.aramis import MS_PER_DAY, MeasurementOutcome, SensorState
+from cubestack.firmware_model.aramis.telemetry import body_quaternion
+from cubestack.firmware_model.interface.aramis import (
+    INTERFACE,
+    MS_PER_DAY,
+    MeasurementOutcome,
+    SensorState,
+)
+from cubestack.firmware_model.interface.aramis.switches import AramisSwitches
 from cubestack.firmware_model.interface.codec.field import InterfaceError
+from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
+from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.memory import FlashStore
 
 
@@ -85,3 +101,80 @@ def test_damaged_pages_are_noticed_and_left_out(page: str, damage: Any) -> None:
     assert again.damaged
     for key, command in {CONFIG_PAGE: "SetGain", BODY_PAGE: "SetBodyRotation"}.items():
         assert (again.all(command) == settings.all(command)) == (key != page)
+
+
+EXTENDED = AramisSwitches.of("extended")
+
+
+def test_a_boresight_is_that_of_the_latest_measurement_if_it_gave_one() -> None:
+    """An older attitude is no hint for the next measurement."""
+    state = State(FlashStore())
+    measuring = Measuring(Meter(BLACKFIN_BF533), state, None, None)  # type: ignore[arg-type]
+    assert measuring.latest_boresight() is None
+    turn = Rotation.from_rotvec([0.3, -0.2, 0.1])
+    state.quaternion = turn.as_quat().astype(np.float32)
+    state.measurement.outcome = MeasurementOutcome.CONCLUSIVE
+    assert measuring.latest_boresight() == pytest.approx(turn.as_matrix()[2], abs=1e-6)
+    for outcome in set(MeasurementOutcome) - {MeasurementOutcome.CONCLUSIVE}:
+        state.measurement.outcome = outcome
+        assert measuring.latest_boresight() is None
+
+
+def test_reset_values_are_the_verified_way() -> None:
+    found = configuration(StoredSettings(FlashStore()), EXTENDED)
+    assert found.detection == VERIFIED.detection
+    assert found.field.fov_deg == pytest.approx(VERIFIED.field.fov_deg, abs=1e-5)
+    assert found.profile.sigma_rad == pytest.approx(VERIFIED.profile.sigma_rad, rel=0.01)
+    assert found.profile.verify
+
+
+def test_every_setting_arrives() -> None:
+    settings = StoredSettings(FlashStore())
+    settings.put("SetField", {"FieldOfView": 18.0, "Round": 0})
+    sizes = {"MinPixels": 4, "MaxPixels": 99, "MaxStars": 12}
+    settings.put("SetDetection", {"Sigmas": 3.5, "Spikes": 2, "Needed": 9, "Subtract": 0, **sizes})
+    settings.put("SetIdentification", {"Noise": 0.5, "Pivots": 1, "Verify": 0, "HintTolerance": 9})
+    found = configuration(settings, EXTENDED)
+    assert (found.field.fov_deg, found.field.round) == (18.0, False)
+    assert found.detection == DetectionSettings(
+        3.5, SpikeRemoval.WINDOW, 9, 4, 99, 24, subtract=False, local=True
+    )
+    profile = found.profile
+    assert profile.sigma_rad == pytest.approx(0.5 / 3232.64, rel=1e-4)
+    assert (profile.pivots, profile.verify, profile.hint_tolerance_deg) == (1, False, 9)
+
+
+def test_what_a_switch_has_as_printed_no_setting_changes() -> None:
+    settings, printed = StoredSettings(FlashStore()), AramisSwitches.of("published")
+    before = configuration(settings, printed)
+    assert not before.detection.subtract
+    assert before.profile.sigma_rad == pytest.approx(0.26 * 0.3759 / 582, rel=1e-6)
+    settings.put("SetIdentification", {"Noise": 0.5, "Pivots": 3, "Verify": 1, "HintTolerance": 6})
+    assert configuration(settings, printed) == before
+    settings.put("SetField", {"FieldOfView": 18.0, "Round": 1})
+    likely = configuration(settings, printed).profile
+    assert likely.sigma_rad == pytest.approx(0.26 * np.radians(18) / 582, rel=1e-3)
+
+
+@given(st.data())
+def test_whatever_the_tables_allow_is_allowed_by_the_processing(data: st.DataObject) -> None:
+    settings = StoredSettings(FlashStore())
+    for name in ("SetField", "SetDetection", "SetIdentification"):
+        message = INTERFACE.telecommand(name)
+        drawn = data.draw(st.binary(min_size=message.length, max_size=message.length))
+        values = message.unpack(drawn)
+        if not message.violations(values):
+            settings.put(name, values)
+    configuration(settings)
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_the_body_s_attitude_is_the_rotations_product(seed: int) -> None:
+    turn, attitude = Rotation.random(2, random_state=np.random.default_rng(seed))
+    found = body_quaternion(*(one.as_quat().astype(np.float32) for one in (turn, attitude)))
+    assert ((turn * attitude).inv() * Rotation.from_quat(found)).magnitude() < 1e-6
+
+
+def test_the_smallest_star_may_not_exceed_the_largest() -> None:
+    with pytest.raises(ValueError, match="min_pixels must be 1 to 8 px, not 9"):
+        DetectionSettings(min_pixels=9, max_pixels=8)

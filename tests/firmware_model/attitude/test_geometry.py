@@ -23,17 +23,8 @@ from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
 from cubestack.firmware_model.mcu.costs import Meter
 
 #: Figure 5.12 with the signs of the coefficients inverted, focal length from star pairs (5.4).
-C = CameraParameters(
-    focal_length_mm=6.28,
-    fx=1147.5,
-    fy=1147.4,
-    cx=539.0,
-    cy=175.5,
-    k1=0.32358,
-    k2=-0.12456,
-    p1=-0.00414,
-    p2=0.00624,
-)
+C = CameraParameters(6.28, 1147.5, 1147.4, 539.0, 175.5, 0.32358, -0.12456, -0.00414, 0.00624)
+NAMES = ("focal_length_mm", "fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2")
 
 
 def brown(p: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -87,9 +78,8 @@ def test_sky_angles_and_directions_are_inverse(seed: int) -> None:
 
 @pytest.mark.parametrize("name", ["focal_length_mm", "fx", "fy", "pitch_mm"])
 def test_lengths_must_be_positive(name: str) -> None:
-    values = dict.fromkeys(("focal_length_mm", "fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2"), 1.0)
     with pytest.raises(CameraParameterError, match=f"{name} must be above 0, not 0.0"):
-        CameraParameters(**(values | {name: 0.0}))
+        CameraParameters(**(dict.fromkeys(NAMES, 1.0) | {name: 0.0}))
 
 
 RNG = np.random.default_rng(5)
@@ -138,15 +128,19 @@ NEAR_PX = 2.0
 
 
 def calibrated(lens: Optics) -> FieldOfView:
-    names = ("focal_length_mm", "fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2")
-    return field_of_view(CameraParameters(**{n: getattr(lens, n) for n in names}), COLUMNS, ROWS)
+    return field_of_view(CameraParameters(**{n: getattr(lens, n) for n in NAMES}), COLUMNS, ROWS)
+
+
+def rays_ahead(seed: int, count: int) -> NDArray[np.float64]:
+    """Unit vectors (count, 3) in the field and around it."""
+    sides = np.random.default_rng(seed).uniform([-0.7, -0.5], [0.7, 0.5], (count, 2))
+    rays = np.column_stack([sides, np.ones(count)])
+    return np.asarray(rays / np.linalg.norm(rays, axis=1, keepdims=True))
 
 
 @pytest.mark.parametrize("factor", [1.0, 0.98])
 def test_it_is_that_of_the_lens(factor: float) -> None:
-    rng = np.random.default_rng(1)
-    rays = np.column_stack([rng.uniform([-0.7, -0.5], [0.7, 0.5], (4000, 2)), np.ones(4000)])
-    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    rays = rays_ahead(1, 4000)
     pixels = LENS.project(rays)
     pixels[np.isnan(pixels)] = -999.0
     depth = np.minimum(pixels, np.array([COLUMNS - 1, ROWS - 1]) - pixels).min(axis=1)
@@ -191,9 +185,7 @@ def test_nothing_is_seen_in_blind_cells_and_the_field_is_that_much_smaller() -> 
     assert seen.solid_angle_sr == pytest.approx(share * field.solid_angle_sr)
     assert field.without(np.zeros_like(blind)) is field
 
-    rng = np.random.default_rng(3)
-    rays = np.column_stack([rng.uniform([-0.7, -0.5], [0.7, 0.5], (8000, 2)), np.ones(8000)])
-    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    rays = rays_ahead(3, 8000)
     rays = rays[field.contains(rays.astype(np.float32), Meter(CORTEX_M3))]
     across, down = np.nan_to_num(LENS.project(rays), nan=-999.0).T
     inside = (across >= 0) & (across < COLUMNS) & (down >= 0) & (down < ROWS)

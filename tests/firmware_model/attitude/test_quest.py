@@ -28,12 +28,8 @@ def in_field(rng: np.random.Generator, count: int) -> Matrix:
 
 
 def solve(body: Matrix, inertial: Matrix, weights: Matrix) -> NDArray[np.float32]:
-    return quest(
-        body.astype(np.float32),
-        inertial.astype(np.float32),
-        weights.astype(np.float32),
-        Meter(CORTEX_M3),
-    )
+    given = (one.astype(np.float32) for one in (body, inertial, weights))
+    return quest(*given, Meter(CORTEX_M3))
 
 
 def angle_deg(a: Matrix, b: Matrix) -> float:

@@ -3,10 +3,11 @@ and claimed uncertainties against errors that were drawn.
 """
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from cubestack.firmware_model.attitude.covariance import covariance
@@ -28,13 +29,13 @@ def unit(vectors: NDArray[np.floating]) -> Floats:
 
 
 def seen(
-    rng: np.random.Generator, count: int = 12, side: float = 0.0
+    rng: np.random.Generator, count: int = 12, side: float = 0.0, sigmas: ArrayLike = SIGMA
 ) -> tuple[Floats, Floats, Rotation]:
     """Measured and catalogue vectors (count, 3), and the attitude; ``side`` moves the stars off."""
     points = np.column_stack([rng.uniform(-0.4, 0.4, (count, 2)), np.ones(count)])
     points[:, 0] += side
     body, truth = unit(points), Rotation.random(rng=rng)
-    noisy = unit(body + SIGMA * rng.standard_normal(body.shape))
+    noisy = unit(body + np.reshape(sigmas, (-1, 1)) * rng.standard_normal(body.shape))
     return noisy, np.asarray(truth.inv().apply(body), np.float32), truth
 
 
@@ -45,6 +46,12 @@ def fitted(measured: Floats, reference: Floats, scale: float = 1.0) -> AttitudeF
 
 def error(quaternion: Floats, truth: Rotation) -> NDArray[np.float64]:
     return np.asarray((Rotation.from_matrix(dcm(quaternion, METER)) * truth.inv()).as_rotvec())
+
+
+def hold(one: ArrayLike, three: ArrayLike, low: float = 0.62, high: float = 0.8) -> None:
+    """Shares inside one claimed sigma and inside three are those of a normal distribution."""
+    assert np.all((low < np.asarray(one)) & (np.asarray(one) < high)), one
+    assert np.all(np.asarray(three) > 0.985), three
 
 
 def shares(draw: Callable[[np.random.Generator], tuple[Floats, Floats, Rotation]]) -> list[float]:
@@ -78,9 +85,7 @@ def test_sigmas_hold_with_displaced_stars() -> None:
         measured[:1] = unit(measured[:1] + rng.normal(0, 40 * SIGMA, (1, 3)))
         return measured, reference, truth
 
-    one, three = shares(draw)
-    assert 0.62 < one < 0.8
-    assert three > 0.985
+    hold(*shares(draw))
 
 
 @pytest.mark.parametrize("factor", quick([0.99, 0.999, 1.003, 1.0, 1.02], 2))
@@ -94,9 +99,7 @@ def test_another_focal_length_is_found_where_there_is_one(factor: float, side: f
     scale = fitted(measured, reference).scale
     assert scale == pytest.approx(factor, abs=2e-4)
     assert factor != 1 or scale == 1
-    one, three = shares(draw)
-    assert 0.62 < one < 0.8
-    assert three > 0.985
+    hold(*shares(draw))
 
 
 def test_a_first_guess_of_the_focal_length_is_refined() -> None:
@@ -122,41 +125,19 @@ def test_a_belief_that_is_too_small_blames_no_star() -> None:
     assert np.sqrt(np.mean(np.square(apart))) < 0.08 * SIGMA
 
 
-FIELD_DEG = 20
-
-
-def _stars(count: int, rng: np.random.Generator) -> NDArray[np.float32]:
-    """Unit vectors (count, 3) spread over the camera's field."""
-    edge = np.tan(np.radians(FIELD_DEG))
-    points = np.column_stack([rng.uniform(-edge, edge, (count, 2)), np.ones(count)])
-    return np.asarray(points / np.linalg.norm(points, axis=1)[:, None], np.float32)
-
-
-def _share_inside(
-    count: int,
-    noise: float,
-    rng: np.random.Generator,
-    *,
-    declared: float = 1.0,
-    uneven: bool = False,
+def axis_shares(
+    count: int, noise: float, seed: Any, declared: float = 1.0, uneven: bool = False
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Shares (3,) of errors inside one claimed sigma, and inside three."""
-    ratios = []
-    for _ in range(600):
-        body = _stars(count, rng)
-        truth = Rotation.random(rng=rng)
-        reference = truth.inv().apply(body).astype(np.float32)
+    rng, ratios = np.random.default_rng(seed), []
+    for _ in range(2 * DRAWS):
         sigmas = noise * (rng.uniform(0.4, 2.5, count) if uneven else np.ones(count))
-        moved = body + sigmas[:, None] * rng.standard_normal(body.shape)
-        measured = (moved / np.linalg.norm(moved, axis=1)[:, None]).astype(np.float32)
+        measured, reference, truth = seen(rng, count, sigmas=sigmas)
         said = (declared * sigmas).astype(np.float32)
-        meter = Meter(CORTEX_M3)
-        matrix = dcm(quest(measured, reference, said**-2, meter), meter)
-        residuals = np.linalg.norm(measured - reference @ matrix.T, axis=1)
-        claimed = covariance(measured, residuals, said, meter)
-        error = (Rotation.from_matrix(matrix) * truth.inv()).as_rotvec()
-        ratios.append(error / np.sqrt(np.diag(claimed)))
-        assert meter.total > 0
+        quaternion = quest(measured, reference, said**-2, METER)
+        residuals = np.linalg.norm(measured - reference @ dcm(quaternion, METER).T, axis=1)
+        claimed = covariance(measured, residuals, said, METER)
+        ratios.append(error(quaternion, truth) / np.sqrt(np.diag(claimed)))
     inside = np.abs(ratios)
     return np.mean(inside < 1, axis=0), np.mean(inside < 3, axis=0)
 
@@ -164,45 +145,36 @@ def _share_inside(
 @pytest.mark.parametrize("noise", [3e-5, 1e-3])
 @pytest.mark.parametrize("count", [3, 5, 15])
 def test_sigmas_hold_per_axis(count: int, noise: float) -> None:
-    one, three = _share_inside(count, noise, np.random.default_rng([count, round(1e6 * noise)]))
-    assert np.all((one > 0.62) & (one < 0.78)), one
-    assert np.all(three > 0.985), three
+    hold(*axis_shares(count, noise, [count, round(1e6 * noise)]), high=0.78)
 
 
 def test_sigmas_hold_with_uneven_stars() -> None:
-    one, three = _share_inside(8, 2e-4, np.random.default_rng(4), uneven=True)
-    assert np.all((one > 0.62) & (one < 0.78)), one
-    assert np.all(three > 0.985), three
+    hold(*axis_shares(8, 2e-4, 4, uneven=True), high=0.78)
 
 
 @pytest.mark.parametrize("declared", [0.6, 1.6])
 def test_residuals_correct_a_wrong_belief(declared: float) -> None:
-    one, three = _share_inside(15, 2e-4, np.random.default_rng(5), declared=declared)
-    assert np.all((one > 0.6) & (one < 0.8)), one
-    assert np.all(three > 0.985), three
+    hold(*axis_shares(15, 2e-4, 5, declared=declared), low=0.6)
 
 
 def test_refuses_what_determines_no_attitude() -> None:
-    three, nothing = (
-        np.repeat(np.array([[0, 0, 1]], np.float32), 3, axis=0),
-        np.zeros(3, np.float32),
-    )
+    three, nothing = np.array([[0, 0, 1]] * 3, np.float32), np.zeros(3, np.float32)
     sigmas = np.ones(3, np.float32)
     with pytest.raises(AttitudeError, match="2 stars, not 1"):
-        covariance(three[:1], nothing[:1], sigmas[:1], Meter(CORTEX_M3))
+        covariance(three[:1], nothing[:1], sigmas[:1], METER)
     with pytest.raises(AttitudeError, match="one direction"):
-        covariance(three, nothing, sigmas, Meter(CORTEX_M3))
+        covariance(three, nothing, sigmas, METER)
 
 
 def test_residuals_beyond_what_chance_gives_count_more() -> None:
     rng = np.random.default_rng(9)
-    body = _stars(12, rng)
+    body = seen(rng)[0]
     sigmas = np.full(12, 1e-4, np.float32)
 
     def ratio(residual: float) -> float:
         residuals = np.full(12, residual * 1e-4, np.float32)
         plain, more = (
-            covariance(body, residuals, sigmas, Meter(CORTEX_M3), excess=excess, beyond=2.0)
+            covariance(body, residuals, sigmas, METER, excess=excess, beyond=2.0)
             for excess in (1.0, 4.0)
         )
         shares = more / plain

@@ -1,7 +1,13 @@
 import numpy as np
 import pytest
 
-from cubestack.firmware_model.cubesense.vision.distortion import Projection, RadiusTable, fine_table
+from cubestack.firmware_model.cubesense.vision.distortion import (
+    Projection,
+    RadiusTable,
+    byte_table,
+    fine_table,
+)
+from cubestack.firmware_model.cubesense.vision.nadir import NadirConfig
 from cubestack.firmware_model.interface.cubesense.switches import CubeSenseSwitches
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.pic18 import PIC18F45K20
@@ -23,6 +29,11 @@ def equidistant() -> RadiusTable:
 @pytest.fixture(scope="session")
 def stereographic() -> RadiusTable:
     return fine_table(Meter(PIC18F45K20), Projection.STEREOGRAPHIC)
+
+
+@pytest.fixture
+def published(meter: Meter) -> NadirConfig:
+    return NadirConfig(byte_table(meter), Projection.EQUIDISTANT, checked=False)
 
 
 @pytest.fixture

@@ -16,7 +16,13 @@ from cubestack.firmware_model.cubesense.links.node import NodeLink
 from cubestack.firmware_model.cubesense.program import CubeSenseProgram
 from cubestack.firmware_model.interface.cameras.ov7620 import REGISTERS
 from cubestack.firmware_model.interface.cubesense import INTERFACE, pins
-from cubestack.firmware_model.interface.cubesense.codes import COLUMNS, ROWS, Camera, Sram
+from cubestack.firmware_model.interface.cubesense.codes import (
+    COLUMNS,
+    ROWS,
+    Camera,
+    CaptureResult,
+    Sram,
+)
 from cubestack.firmware_model.interface.cubesense.fpga import Action, actions
 from cubestack.firmware_model.interface.cubesense.switches import (
     DEFAULT_SWITCHES,
@@ -39,6 +45,12 @@ ACK = {"SUNACK": Sram.SRAM1, "NADACK": Sram.SRAM2}
 EDGE_ACTIONS = {Action.EDGE, Action.PASS_EDGE}
 ADDRESSING = {Action.TAKE_ADDRESS, Action.READ_FROM}
 LINES = ("SHIFT", "EDGE", "RNW")
+
+
+def stored(camera: Camera, sram: Sram) -> CaptureResult:
+    """The capture result of a picture that went to a memory."""
+    own = sram.value == camera.value
+    return CaptureResult.STORED_OWN_SRAM if own else CaptureResult.STORED_OTHER_SRAM
 
 
 class SccbCamera:

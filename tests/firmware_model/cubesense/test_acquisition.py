@@ -19,7 +19,7 @@ from cubestack.firmware_model.interface.cubesense.codes import Camera, CaptureRe
 from cubestack.firmware_model.interface.cubesense.fpga import Action, Actions, actions
 from cubestack.firmware_model.mcu.requests import Request, SetPin, StrobeRead
 
-from .harness import FRAME_US, READ_OUT_US, Harness
+from .harness import FRAME_US, READ_OUT_US, Harness, stored
 from .scenery import COLUMNS, ROWS, earth, edges_in, sun, window
 
 
@@ -72,9 +72,7 @@ def test_a_picture_goes_to_its_memory(rig: Rig, camera: Camera, sram: Sram, row:
     rig.scenes[camera] = picture = earth(0, 0)
     other = Sram(1 - sram)
     kept = rig.memories[other].copy()
-    own = sram.value == camera.value
-    stored = CaptureResult.STORED_OWN_SRAM if own else CaptureResult.STORED_OTHER_SRAM
-    assert rig.store(camera, sram) is stored
+    assert rig.store(camera, sram) is stored(camera, sram)
     assert np.array_equal(rig.memories[sram], picture)
     assert np.array_equal(rig.memories[other], kept)
     assert rig.entered()[-1] == row

@@ -11,19 +11,10 @@ from cubestack.firmware_model.mcu.requests import ReadPin, SetPin
 from .harness import Harness
 
 AT_START = {
-    "COMMON_A": 0x00,
-    "COMMON_B": 0x00,
-    "COMMON_C": 0x04,
-    "COMMON_H": 0x60,
-    "COMMON_I": 0x80,
-    "HSTART": 0x2F,
-    "HSTOP": 0xCF,
-    "VSTART": 0x05,
-    "VSTOP": 0xF5,
-    "GAIN": 0,
-    "BLUE_GAIN": 0x80,
-    "RED_GAIN": 0x80,
-}
+    "COMMON_A": 0x00, "COMMON_B": 0x00, "COMMON_C": 0x04, "COMMON_H": 0x60, "COMMON_I": 0x80,
+    "HSTART": 0x2F, "HSTOP": 0xCF, "VSTART": 0x05, "VSTOP": 0xF5,
+    "GAIN": 0, "BLUE_GAIN": 0x80, "RED_GAIN": 0x80,
+}  # fmt: skip
 
 
 def capture(unit: Harness, camera: Camera = Camera.SUN) -> None:
@@ -85,12 +76,8 @@ def test_a_camera_reset_cycles_the_supply_and_sets_up_again(unit: Harness) -> No
     unit.log.clear()
     unit.command("Reset", Target=ResetTarget.CAMERAS)
     power = [r for _, r in unit.log if isinstance(r, SetPin) and r.pin.endswith("POWER")]
-    assert power == [
-        SetPin("SUN_POWER", 0),
-        SetPin("NAD_POWER", 0),
-        SetPin("SUN_POWER", 1),
-        SetPin("NAD_POWER", 1),
-    ]
+    names = ("SUN_POWER", "NAD_POWER")
+    assert power == [SetPin(name, level) for level in (0, 1) for name in names]
     assert unit.cameras[Camera.SUN].registers == {**AT_START, "EXPOSURE": 9}
 
 

@@ -9,18 +9,14 @@ from cubestack.firmware_model.interface.cubesense import INTERFACE, codes, pins
 from cubestack.firmware_model.mcu.requests import SetPin, StrobeRead
 
 from ..registry import registered_in
-from .harness import Harness
-from .scenery import earth, place, sun, thumbnail
+from .harness import Harness, stored
+from .scenery import SUN_BORESIGHT, earth, place, sun, thumbnail
 
 Effect = Callable[[Harness], None]
 EFFECTS: dict[str, Effect] = {}
 
-SUN_BORESIGHT = (369.0, 250.0)
-
+#: Their effects show in a result's values and codes, as the verified vision returns them.
 OF_RESULTS = {"DetectionThreshold", "Boresight", "Mask", "Distortion"}
-"""Their effects show in a result's values and codes, as the verified vision returns them."""
-
-
 #: Decorator: the function shows what the named telecommands do.
 telecommand = registered_in(EFFECTS)
 
@@ -113,10 +109,7 @@ def capture_and_detect(unit: Harness) -> None:
         for sram in codes.Sram:
             unit.command("CaptureAndDetect", Camera=camera, Sram=sram)
             found = result(unit, camera)
-            own = codes.CaptureResult.STORED_OWN_SRAM
-            assert found["Capture"] == (
-                own if sram == camera else codes.CaptureResult.STORED_OTHER_SRAM
-            )
+            assert found["Capture"] == stored(camera, sram)
             assert found["Detect"] == codes.DetectResult.SUCCESS
             assert (found["Alpha"], found["Beta"]) == pytest.approx((12.0, -7.0), abs=0.5)
             np.testing.assert_array_equal(unit.memories[sram], unit.scenes[camera])
@@ -195,10 +188,7 @@ def boresight(unit: Harness) -> None:
 @telecommand("Mask1", "Mask2")
 def mask(unit: Harness) -> None:
     lit(unit)
-    missed = {
-        codes.Camera.SUN: codes.DetectResult.SUN_NOT_FOUND,
-        codes.Camera.NADIR: codes.DetectResult.TOO_FEW_EDGES,
-    }
+    missed = codes.DetectResult.SUN_NOT_FOUND, codes.DetectResult.TOO_FEW_EDGES
     for camera in codes.Camera:
         name = f"Mask{camera + 1}"
         unit.command(name, Area=3, XMin=0, XMax=639, YMin=0, YMax=479)

@@ -154,10 +154,7 @@ def test_random_bytes_during_any_operation(seed: int) -> None:
 
 
 STEPS: list[Step] = [
-    ("CaptureAndDetect", {"Camera": 0, "Sram": 0}),
-    ("CaptureAndDetect", {"Camera": 1, "Sram": 1}),
-    ("CaptureAndDetect", {"Camera": 0, "Sram": 1}),
-    ("CaptureAndDetect", {"Camera": 1, "Sram": 0}),
+    *(("CaptureAndDetect", {"Camera": c, "Sram": s}) for s, c in ((0, 0), (1, 1), (1, 0), (0, 1))),
     ("SetNadirSearch", {"Search": 1}),
     ("CaptureAndDetect", {"Camera": 1, "Sram": 1}),
     ("CaptureOnly", {"Camera": 0, "Sram": 0, "Location": 0}),

@@ -17,7 +17,7 @@ from cubestack.firmware_model.cubesense.measurement import (
     ticks_since,
 )
 from cubestack.firmware_model.cubesense.state import distortion_of
-from cubestack.firmware_model.cubesense.vision.distortion import Projection, fine_table
+from cubestack.firmware_model.cubesense.vision.distortion import Projection, RadiusTable, fine_table
 from cubestack.firmware_model.cubesense.vision.edges import EdgeConfig
 from cubestack.firmware_model.cubesense.vision.nadir import NadirConfig, find_nadir
 from cubestack.firmware_model.cubesense.vision.sun_centroid import SunConfig, find_sun
@@ -34,7 +34,7 @@ from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.pic18 import PIC18F45K20
 from cubestack.firmware_model.mcu.requests import ReadTimer, Routine, SetPin, StrobeRead
 
-from .harness import FRAME_US, READ_OUT_US, Harness
+from .harness import FRAME_US, READ_OUT_US, Harness, stored
 from .scenery import SUN_BORESIGHT, chequered, earth, edges_in, error_deg, place, sun, window
 
 TICK_US = 51.2
@@ -48,11 +48,13 @@ def measure(unit: Harness, camera: Camera, sram: Sram | None = None) -> dict[str
 
 
 def result(unit: Harness, camera: Camera) -> dict[str, Any]:
-    return {
-        **unit.telemetry(f"Result{camera + 1}"),
-        **unit.telemetry(f"Details{camera + 1}"),
-        **unit.telemetry(f"PhaseTimes{camera + 1}"),
-    }
+    frames = (unit.telemetry(f"{n}{camera + 1}") for n in ("Result", "Details", "PhaseTimes"))
+    return {name: value for frame in frames for name, value in frame.items()}
+
+
+def reset_table(camera: Camera, projection: Projection) -> RadiusTable:
+    factors = distortion_of(INTERFACE.telecommand(f"Distortion{camera + 1}").reset_values())
+    return fine_table(Meter(PIC18F45K20), projection, factors)
 
 
 def outcome(values: dict[str, Any]) -> tuple[CaptureResult, DetectResult]:
@@ -75,13 +77,9 @@ def edges_of(unit: Harness) -> set[tuple[float, float]]:
 def test_the_sun_in_either_memory(unit: Harness, sram: Sram, truth: tuple[float, float]) -> None:
     unit.scenes[Camera.SUN] = picture = sun_at(*truth)
     measured = measure(unit, Camera.SUN, sram)
-    own = sram is Sram.SRAM1
-    stored = CaptureResult.STORED_OWN_SRAM if own else CaptureResult.STORED_OTHER_SRAM
-    assert outcome(measured) == (stored, DetectResult.SUCCESS)
+    assert outcome(measured) == (stored(Camera.SUN, sram), DetectResult.SUCCESS)
     assert error_deg((measured["Alpha"], measured["Beta"]), truth) < 0.1
-    factors = distortion_of(INTERFACE.telecommand("Distortion1").reset_values())
-    table = fine_table(Meter(PIC18F45K20), Projection.EQUIDISTANT, factors)
-    data = window(picture)
+    data, table = window(picture), reset_table(Camera.SUN, Projection.EQUIDISTANT)
     expected = find_sun(data, SunConfig(table), Meter(PIC18F45K20))
     assert (measured["X"], measured["Y"]) == (expected.x / 100, expected.y / 100)
     assert (measured["FirstX"], measured["FirstY"]) == tuple(data[:4].view("<u2"))
@@ -95,14 +93,10 @@ def test_the_sun_in_either_memory(unit: Harness, sram: Sram, truth: tuple[float,
 def test_the_earth_in_either_memory(unit: Harness, sram: Sram, truth: tuple[float, float]) -> None:
     unit.scenes[Camera.NADIR] = picture = earth(*truth)
     measured = measure(unit, Camera.NADIR, sram)
-    own = sram is Sram.SRAM2
-    stored = CaptureResult.STORED_OWN_SRAM if own else CaptureResult.STORED_OTHER_SRAM
-    assert outcome(measured) == (stored, DetectResult.SUCCESS)
+    assert outcome(measured) == (stored(Camera.NADIR, sram), DetectResult.SUCCESS)
     assert error_deg((measured["Alpha"], measured["Beta"]), truth) < 0.2
-    factors = distortion_of(INTERFACE.telecommand("Distortion2").reset_values())
-    meter = Meter(PIC18F45K20)
+    meter, table = Meter(PIC18F45K20), reset_table(Camera.NADIR, Projection.STEREOGRAPHIC)
     edges = edges_in(picture, meter, EdgeConfig(sharp=True))
-    table = fine_table(meter, Projection.STEREOGRAPHIC, factors)
     expected = find_nadir(edges, NadirConfig(table), meter)
     assert (measured["X"], measured["Y"]) == (expected.x / 100, expected.y / 100)
     assert (measured["Points"], measured["Sram"]) == (expected.edges, sram)
@@ -280,8 +274,7 @@ def test_the_boresight_moves_the_suns_centre(unit: Harness) -> None:
     unit.scenes[Camera.SUN] = sun(np.array([369.0, 250.0]), 6)
     unit.command("Boresight1", X=359.5, Y=253.25)
     measured = measure(unit, Camera.SUN)
-    factors = distortion_of(INTERFACE.telecommand("Distortion1").reset_values())
-    table = fine_table(Meter(PIC18F45K20), Projection.EQUIDISTANT, factors)
+    table = reset_table(Camera.SUN, Projection.EQUIDISTANT)
     config = SunConfig(table, boresight=(359.5, 253.25))
     expected = find_sun(window(unit.memories[Sram.SRAM1]), config, Meter(PIC18F45K20))
     assert (measured["X"], measured["Y"]) == (expected.x / 100, expected.y / 100)

@@ -1,4 +1,3 @@
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -19,6 +18,7 @@ Values = dict[str, Any]
 
 UPTIME_US = 70_123_456
 OVER = 0x10000
+FLAGS = ("TcmdBufferOverrun", "I2cTlmReadError", "UartProtocolError", "UartMsgIncomplete")
 SWITCHES = CubeSenseSwitches.of("extended", "edges=listing")
 
 
@@ -32,10 +32,7 @@ def no_two_alike(node: Links) -> None:
         settings.auto_adjust = 1 - camera
         settings.exposure = 1000 + base
         settings.gain, settings.blue_gain, settings.red_gain = 2 * base // 5, base + 2, base + 3
-        settings.masks = [
-            Mask(base + area, base + area + 10, base + area + 20, base + area + 30)
-            for area in range(5)
-        ]
+        settings.masks = [Mask(*range(base + area, base + area + 40, 10)) for area in range(5)]
         state.results[camera] = CameraResult(
             capture=codes.CaptureResult.STORED_OTHER_SRAM,
             detect=codes.DetectResult(codes.DetectResult.BAD_FIT + camera),
@@ -69,55 +66,41 @@ def no_two_alike(node: Links) -> None:
     download.number, download.checksum = 4097, 171
 
 
-def result(camera: codes.Camera) -> Values:
-    base = (camera + 1) * 100
-    return {
-        "Alpha": (1000 + base) / 100,
-        "Beta": (-2000 - base) / 100,
-        "Capture": 3,
-        "Detect": 5 + camera,
-    }
-
-
-def masks(camera: codes.Camera) -> Values:
-    base = (camera + 1) * 100
-    names = ("XMin", "XMax", "YMin", "YMax")
-    return {
-        f"{name}{area + 1}": base + area + 10 * index
-        for area in range(5)
-        for index, name in enumerate(names)
-    }
-
-
-def details(camera: codes.Camera) -> Values:
-    base = (camera + 1) * 100
-    return {
-        "X": (3000 + base) / 100,
-        "Y": (-4000 - base) / 100,
-        "Radius": (40000 + base) / 100,
-        "Points": base % 250,
-        "Sram": 1 - camera,
-        "FirstX": base + 4,
-        "FirstY": base + 5,
-        "PixelsRead": OVER + base,
-    }
-
-
-def quality(camera: codes.Camera) -> Values:
-    base = (camera + 1) * 100
-    return {
-        "SigmaAlpha": (base + 6) / 100,
-        "SigmaBeta": (base + 7) / 100,
-        "Rms": (base + 8) / 100,
-        "Found": (base + 9) % 250,
-        "Reason": camera + 1,
-    }
-
-
-def times(camera: codes.Camera) -> Values:
-    start = OVER + (camera + 1) * 100
+def of_camera(camera: codes.Camera) -> dict[str, Values]:
+    """What a camera's frames show, by the beginnings of their names."""
+    base = 100 * (camera + 1)
     phases = ("Wait", "Store", "Search", "Centroid", "Total")
-    return {name: start + 1 + index for index, name in enumerate(phases)}
+    return {
+        "Masks": {
+            f"{side}{area + 1}": base + area + 10 * index
+            for area in range(5)
+            for index, side in enumerate(("XMin", "XMax", "YMin", "YMax"))
+        },
+        "Details": {
+            "X": (3000 + base) / 100,
+            "Y": (-4000 - base) / 100,
+            "Radius": (40000 + base) / 100,
+            "Points": base % 250,
+            "Sram": 1 - camera,
+            "FirstX": base + 4,
+            "FirstY": base + 5,
+            "PixelsRead": OVER + base,
+        },
+        "Quality": {
+            "SigmaAlpha": (base + 6) / 100,
+            "SigmaBeta": (base + 7) / 100,
+            "Rms": (base + 8) / 100,
+            "Found": (base + 9) % 250,
+            "Reason": camera + 1,
+        },
+        "PhaseTimes": {phase: OVER + base + 1 + index for index, phase in enumerate(phases)},
+    }
+
+
+def result(camera: codes.Camera) -> Values:
+    base = 100 * (camera + 1)
+    angles = {"Alpha": (1000 + base) / 100, "Beta": (-2000 - base) / 100}
+    return {**angles, "Capture": 3, "Detect": 5 + camera}
 
 
 def edges(part: int) -> Values:
@@ -130,23 +113,15 @@ def edges(part: int) -> Values:
     return values
 
 
-def configuration() -> Values:
-    values: Values = {}
-    for number in (1, 2):
-        base = 100 * number
-        values |= {
-            f"Threshold{number}": base + 1,
-            f"AutoAdjust{number}": 2 - number,
-            f"Exposure{number}": 1000 + base,
-            f"Gain{number}": 40 * number,
-            f"BlueGain{number}": base + 2,
-            f"RedGain{number}": base + 3,
-        }
-    return values
+def configuration(number: int) -> Values:
+    base = 100 * number
+    values = {"Threshold": base + 1, "AutoAdjust": 2 - number, "Exposure": 1000 + base}
+    values |= {"Gain": 40 * number, "BlueGain": base + 2, "RedGain": base + 3}
+    return {f"{name}{number}": value for name, value in values.items()}
 
 
-EXPECTED: dict[str, Callable[[], Values]] = {
-    "Identification": lambda: {
+EXPECTED: dict[str, Values] = {
+    "Identification": {
         "NodeType": NODE_TYPE,
         "InterfaceVersion": 2,
         "FirmwareVersionMajor": FIRMWARE_VERSION[0],
@@ -154,49 +129,34 @@ EXPECTED: dict[str, Callable[[], Values]] = {
         "RuntimeSeconds": 70,
         "RuntimeMilliseconds": 123,
     },
-    "SerialNumber": lambda: {"SerialNumber": b"CS0042"},
-    "CommunicationStatus": lambda: {
+    "SerialNumber": {"SerialNumber": b"CS0042"},
+    "CommunicationStatus": {
         "TcmdCount": 258,
         "TlmCount": 515,  # this request too
-        "TcmdBufferOverrun": 0,
-        "I2cTlmReadError": 0,
-        "UartProtocolError": 0,
-        "UartMsgIncomplete": 0,
+        **dict.fromkeys(FLAGS, 0),
     },
-    "TcmdProcessed": lambda: {"LastTcmd": 65, "Processed": 0, "Error": 3},
-    "Power": lambda: {
-        "Current3V3": 1.5,
-        "CurrentSram1": 2.5,
-        "CurrentSram2": 3.5,
-        "Current5V": 4.5,
-        "OverCurrent1": 0,
-        "OverCurrent2": 1,
+    "TcmdProcessed": {"LastTcmd": 65, "Processed": 0, "Error": 3},
+    "Power": {
+        **{"Current3V3": 1.5, "CurrentSram1": 2.5, "CurrentSram2": 3.5, "Current5V": 4.5},
+        **{"OverCurrent1": 0, "OverCurrent2": 1},
     },
-    "Configuration": configuration,
-    "ImageFrame": lambda: {"Frame": (np.arange(128) * 3).astype(np.uint8).tobytes()},
-    "ImageFrameInfo": lambda: {"FrameNumber": 4097, "Checksum": 171},
-    "Profile": lambda: shown_values(SWITCHES),
-    "NadirSearchMode": lambda: {"Search": codes.NadirSearch.AROUND_SAMPLES},
-    "NadirEdges1": lambda: edges(0),
-    "NadirEdges2": lambda: edges(1),
-    **{f"Masks{camera + 1}": lambda c=camera: masks(c) for camera in codes.Camera},
-    **{f"Details{camera + 1}": lambda c=camera: details(c) for camera in codes.Camera},
-    **{f"Quality{camera + 1}": lambda c=camera: quality(c) for camera in codes.Camera},
-    **{f"PhaseTimes{camera + 1}": lambda c=camera: times(c) for camera in codes.Camera},
-    **{
-        INTERFACE.telemetry(identifier).name: lambda c=camera: result(c)
-        for camera, identifier in (
-            *telemetry.RESULTS.items(),
-            *((target[0], key) for key, target in telemetry.SCHEDULES.items()),
-        )
-    },
+    "Configuration": configuration(1) | configuration(2),
+    "ImageFrame": {"Frame": (np.arange(128) * 3).astype(np.uint8).tobytes()},
+    "ImageFrameInfo": {"FrameNumber": 4097, "Checksum": 171},
+    "Profile": shown_values(SWITCHES),
+    "NadirSearchMode": {"Search": codes.NadirSearch.AROUND_SAMPLES},
+    "NadirEdges1": edges(0),
+    "NadirEdges2": edges(1),
+    **{f"{kind}{c + 1}": shown for c in codes.Camera for kind, shown in of_camera(c).items()},
+    **{INTERFACE.telemetry(number).name: result(c) for c, number in telemetry.RESULTS.items()},
+    **{INTERFACE.telemetry(n).name: result(c) for n, (c, _) in telemetry.SCHEDULES.items()},
 }
 
 
 @pytest.mark.parametrize("name", [message.name for message in INTERFACE.telemetries])
 def test_every_field_shows_its_source(node: Links, name: str) -> None:
     no_two_alike(node)
-    expected = EXPECTED[name]()
+    expected = EXPECTED[name]
     assert node.telemetry(name) == pytest.approx(expected)
     assert expected.keys() == {field.name for field in INTERFACE.telemetry(name).fields}
 
@@ -205,9 +165,7 @@ def test_every_frame_is_expected() -> None:
     assert EXPECTED.keys() == {message.name for message in INTERFACE.telemetries}
 
 
-@pytest.mark.parametrize(
-    "flag", ["TcmdBufferOverrun", "I2cTlmReadError", "UartProtocolError", "UartMsgIncomplete"]
-)
+@pytest.mark.parametrize("flag", FLAGS)
 def test_each_flag_is_shown_alone(node: Links, flag: str) -> None:
     node.state.flags.add(flag)
     values = node.telemetry("CommunicationStatus")

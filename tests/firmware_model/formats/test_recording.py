@@ -6,8 +6,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cubestack.firmware_model.formats import recording
+from cubestack.firmware_model.formats import byte_names, recording
+from cubestack.firmware_model.formats.recording import BusMessage, BusTransfer, LineBytes, Recording
 from cubestack.firmware_model.formats.setup import Document, Setup
+from cubestack.firmware_model.interface.codec.frames import encode_frame
+from cubestack.firmware_model.interface.cubesense import INTERFACE
+from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
 
 TIMES = st.integers(0, 10**15)
 UART, I2C = st.just("uart"), st.just("i2c")
@@ -92,3 +96,80 @@ def test_recording_of_a_real_device_has_no_setup():
 def test_rejects_inconsistent_setups(content, reason):
     with pytest.raises(ValueError, match=reason):
         Setup.from_json(content)
+
+
+def exchanged(*exchanges: tuple[bytes, bytes], port: str = "uart") -> Recording:
+    ends = ("host", "device")
+    sides = [side for exchange in exchanges for side in zip(ends, exchange, strict=True)]
+    events = (LineBytes(5000 * at, port, *side, 1) for at, side in enumerate(sides))
+    return Recording("test", "cubesense", {port: 1}, tuple(events))
+
+
+@given(st.binary(max_size=12), st.binary(max_size=6).map(encode_frame))
+def test_offset_of_every_payload_byte(payload, before):
+    """Oracle: where the encoder puts each byte, one by one."""
+    wire, position = before + encode_frame(payload), len(before) + 2
+    for offset, byte in enumerate(payload):
+        for _ in range(2 if byte == 0x1F else 1):
+            assert byte_names.payload_offset(wire, position) == offset
+            position += 1
+    assert byte_names.payload_offset(wire, position) is None
+    assert byte_names.payload_offset(wire, len(before)) is None
+
+
+@pytest.mark.parametrize("interface", [INTERFACE, CUBESTAR], ids=lambda one: one.name)
+def test_every_telemetry_field_is_found(interface):
+    for message in interface.telemetries:
+        if not message.supported:
+            continue
+        answer = encode_frame(bytes(message.length))
+        whole = exchanged((encode_frame(bytes([message.id])), answer))
+        for field in message.fields:
+            index = 2 + field.bit_offset // 8
+            name = byte_names.name_answer_byte(interface, whole, "uart", index)
+            assert f"telemetry {message.name}, field" in name
+            assert field.name in name
+
+
+def test_answers_belong_to_the_request_before_them():
+    whole = exchanged(
+        (encode_frame(b"\x80"), encode_frame(bytes(8))),
+        (encode_frame(b"\x14\0\0"), encode_frame(b"\0")),
+    )
+    for index, name in (
+        (4, "telemetry Identification, field FirmwareVersionMajor"),
+        (14, "acknowledge of telecommand CaptureAndDetect, error code"),
+        (12, "framing"),
+    ):
+        assert byte_names.name_answer_byte(INTERFACE, whole, "uart", index).endswith(name)
+
+
+def test_bench_letter_is_named():
+    both = exchanged((b"a", b"Y"), (b"q", b"YY"), port="bench_uart")
+    for index, letter in enumerate("aqq"):
+        name = byte_names.name_answer_byte(INTERFACE, both, "bench_uart", index)
+        assert name.endswith(f"answer to letter '{letter}'")
+
+
+def test_request_byte_is_named():
+    wire = encode_frame(b"\x80") + encode_frame(bytes([20, 1, 0]))
+    names = [byte_names.name_request_byte(INTERFACE, wire, index, "uart") for index in (7, 8, 9, 5)]
+    assert names[0].endswith("the ID")
+    assert names[1].endswith("telecommand CaptureAndDetect, field Camera")
+    assert names[2].endswith("telecommand CaptureAndDetect, field Sram")
+    assert names[3].endswith("outside of a frame's payload")
+
+
+@pytest.mark.parametrize(
+    ("address", "pointer", "index", "name"),
+    [
+        (0x1B, 0x80, 2, "telemetry Identification, field FirmwareVersionMajor"),
+        (0x1B, 0xFE, 0, "unknown ID 254"),
+        (0x1C, 0x00, 0, "register SUN_THRESHOLD"),
+    ],
+)
+def test_bus_byte_is_named(address, pointer, index, name):
+    sent, read = bytes([pointer]), bytes(8)
+    messages = BusMessage(address, sent, read=False), BusMessage(address, read, read=True)
+    transfer = BusTransfer(0, "i2c", 1, messages)
+    assert byte_names.name_bus_byte(INTERFACE, transfer, 1, index).endswith(name)

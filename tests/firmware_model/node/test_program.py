@@ -1,10 +1,13 @@
 """The program of a plain node: telecommands in order, settings, flags, what it says of itself."""
 
-from collections.abc import Mapping
+import re
+from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.interface.codec.field import u8, u16
 from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.interface.codec.node_messages import AckError, node_interface
@@ -13,6 +16,8 @@ from cubestack.firmware_model.mcu.requests import ReadTimer, Routine, Sleep
 from cubestack.firmware_model.node.commands import QUEUE_DEPTH
 from cubestack.firmware_model.node.program import TELECOMMAND, Action, NodeProgram, Source
 
+from ..cubesense.harness import Harness as CubeSense
+from ..cubestar.harness import Harness as CubeStar
 from ..host_side import HostSide
 from ..runner import Runner
 
@@ -99,16 +104,16 @@ def test_a_telecommand_without_an_action_is_a_setting(node: Node) -> None:
 
 
 @pytest.mark.parametrize(
-    ("payload", "error", "flag"),
+    ("payload", "error"),
     [
-        (bytes([10, 10]), AckError.BAD_PARAMETER, "TcmdRefused"),
-        (bytes([10]), AckError.WRONG_LENGTH, "TcmdRefused"),
-        (bytes([77]), AckError.INVALID_ID, "TcmdRefused"),
+        ((10, 10), AckError.BAD_PARAMETER),
+        ((10,), AckError.WRONG_LENGTH),
+        ((77,), AckError.INVALID_ID),
     ],
 )
-def test_rejection_raises_a_flag(node: Node, payload: bytes, error: AckError, flag: str) -> None:
-    assert node.frames(payload) == [bytes([error])]
-    assert [name for name, up in node.telemetry("ErrorFlags").items() if up] == [flag]
+def test_rejection_raises_a_flag(node: Node, payload: tuple[int, ...], error: AckError) -> None:
+    assert node.frames(bytes(payload)) == [bytes([error])]
+    assert [name for name, up in node.telemetry("ErrorFlags").items() if up] == ["TcmdRefused"]
     assert node.telemetry("TcmdProcessed")["Error"] == error
 
 
@@ -142,3 +147,32 @@ def test_both_buses_carry_the_same(node: Node) -> None:
     node.i2c_write(bytes([10, 4]))
     Runner.run(node)
     assert node.i2c_read(3, 140) == bytes([4, 0, 255])
+
+
+DOCS = Path(__file__).parents[3] / "docs" / "sensors"
+NEXT_US = 5_000  # from one request to the next: settings are applied, measurements are not over
+
+
+def exchanges(page: str) -> list[tuple[str, str]]:
+    blocks = re.findall(r"```wire\n(.*?)```", (DOCS / page).read_text("utf-8"), re.DOTALL)
+    lines = [line for block in blocks for line in block.splitlines()]
+    sent = [line[3:] for line in lines if line.startswith("-> ")]
+    received = [line[3:] for line in lines if line.startswith("<- ")]
+    assert len(sent) == len(received) == len(lines) / 2 > 0
+    return list(zip(sent, received, strict=True))
+
+
+@pytest.mark.parametrize(
+    ("page", "power_on", "pause_us"),
+    [("protocols.md", CubeStar, None), ("protocols-cubesense.md", lambda _: CubeSense(), NEXT_US)],
+)
+def test_examples_of_the_page(
+    page: str,
+    power_on: Callable[[StarCatalogue], CubeStar | CubeSense],
+    pause_us: int | None,
+    catalogue: StarCatalogue,
+) -> None:
+    unit = power_on(catalogue)
+    for request, answer in exchanges(page):
+        assert unit.wire(bytes.fromhex(request)).hex(" ") == answer, request
+        unit.run(None if pause_us is None else unit.now_us + pause_us)

@@ -24,8 +24,10 @@ def image() -> bytes:
     return database(SMALL).pack()
 
 
-def sealed(image: bytes) -> bytes:
-    return image[:-4] + struct.pack("<I", crc32(image[:-4]))
+def changed(image: bytes, offset: int, value: bytes) -> bytes:
+    """Sealed with a checksum that is right again."""
+    other = image[:offset] + value + image[offset + len(value) :]
+    return other[:-4] + struct.pack("<I", crc32(other[:-4]))
 
 
 def place(image: bytes, wanted: str) -> int:
@@ -80,23 +82,20 @@ def test_detects_any_flipped_bit(image: bytes, seed: int) -> None:
     ],
 )
 def test_rejects_misleading_contents(image: bytes, name: str, value: bytes, words: str) -> None:
-    start = place(image, name)
     with pytest.raises(DatabaseError, match=words):
-        Database.unpack(sealed(image[:start] + value + image[start + len(value) :]))
+        Database.unpack(changed(image, place(image, name), value))
 
 
 @pytest.mark.parametrize(("offset", "value"), [(0, b"XRAM"), (4, b"\x09\x00")])
 def test_rejects_other_kinds_of_image(image: bytes, offset: int, value: bytes) -> None:
-    other = image[:offset] + value + image[offset + len(value) :]
     with pytest.raises(DatabaseError, match="an image starts with"):
-        Database.unpack(sealed(other))
+        Database.unpack(changed(image, offset, value))
 
 
 def test_rejects_inconsistent_counts(image: bytes) -> None:
     for offset in (8, 12, 16, 20, 24):
-        other = image[:offset] + b"\x01\x00" + image[offset + 2 :]
         with pytest.raises(DatabaseError):
-            Database.unpack(sealed(other))
+            Database.unpack(changed(image, offset, b"\x01\x00"))
 
 
 SPHERE = geodesic_sphere()

@@ -139,21 +139,12 @@ def test_full_image_has_no_stars() -> None:
 def swept(
     length: float, angle_deg: float, light: float, count: int = 12, background: Any = 0
 ) -> NDArray[np.uint8]:
-    """Spots of standard deviation 1.5 px that move by `length`, of `light` grey levels each."""
-    rng = np.random.default_rng(3)
-    image = rng.normal(6, 1.5, (FIELD.rows, FIELD.columns)) + background
-    steps = max(1, round(2 * length))
-    along = (np.arange(steps) + 0.5) / steps - 0.5
-    y, x = np.mgrid[-80:81, -80:81].astype(float)
-    streak = np.zeros_like(x)
-    for part in along * length:
-        dx, dy = part * np.cos(np.radians(angle_deg)), part * np.sin(np.radians(angle_deg))
-        streak += np.exp(-((x - dx) ** 2 + (y - dy) ** 2) / (2 * 1.5**2))
-    streak *= light / steps / (2 * np.pi * 1.5**2)
-    for number in range(count):
-        row, column = 200 + 180 * (number // 4), 300 + 180 * (number % 4)
-        image[row - 80 : row + 81, column - 80 : column + 81] += streak
-    return np.clip(np.rint(image), 0, 255).astype(np.uint8)
+    """Spots that move by `length`, of `light` grey levels each."""
+    steps, angle = max(1, round(2 * length)), np.radians(angle_deg)
+    along = length * ((np.arange(steps) + 0.5) / steps - 0.5)
+    middles = np.array([(300 + 180 * (n % 4), 200 + 180 * (n // 4)) for n in range(count)])
+    places = middles[:, None] + along[:, None] * [np.cos(angle), np.sin(angle)]
+    return spots(places.reshape(-1, 2), light / steps, level=6 + background, seed=3)
 
 
 @pytest.mark.parametrize("angle_deg", [0, 30, 90, 135])
@@ -210,18 +201,9 @@ def test_without_regions_nothing_is_drawn_out() -> None:
 
 def long_spots(places: NDArray[Any], angles: NDArray[Any]) -> StarSpots:
     """Streaks of 12 px."""
-    count = len(places)
-    ones = np.ones(count, np.float32)
-    return StarSpots(
-        places.astype(np.float32),
-        100 * ones,
-        ones,
-        12 * ones,
-        (angles % np.pi).astype(np.float32),
-        20 * ones,
-        0,
-        0,
-    )
+    ones, places = np.ones(len(places), np.float32), places.astype(np.float32)
+    angles = (angles % np.pi).astype(np.float32)
+    return StarSpots(places, 100 * ones, ones, 12 * ones, angles, 20 * ones, 0, 0)
 
 
 def test_smear_is_the_reason_when_there_is_no_attitude() -> None:

@@ -20,8 +20,6 @@ from ..sky import FIELD, Light, Picture, database, meter, pictures
 
 Vectors = NDArray[np.float32]
 
-Vectors = NDArray[np.float32]
-
 SIGMA = 5.6e-5
 
 
@@ -31,6 +29,14 @@ def directions(made: Picture) -> Vectors:
 
 def match(vectors: Vectors, pivots: Sequence[int], sigma: float, enough: int = 1) -> Match:
     return match_triple(vectors, (0, 1, 2), pivots, sigma, database(), None, meter(), enough)
+
+
+def triangles(count: int, sigma: float, seed: int = 0) -> Iterator[tuple[Picture, Triangle]]:
+    """Of the three brightest stars of each picture, if they are no line."""
+    for made in pictures(count, seed):
+        triangle = measure_triangle(directions(made)[:3], sigma, meter())
+        if triangle is not None:
+            yield made, triangle
 
 
 def within(values: Vectors, middle: np.float32, sigma: np.float32) -> NDArray[np.bool_]:
@@ -55,10 +61,7 @@ def test_candidates_are_those_of_comparing_everything(sigma: float, aided: bool)
     onboard = database()
     all_moments = np.empty_like(onboard.moments)
     all_moments[onboard.moment_triangles] = onboard.moments
-    for made in pictures(40):
-        triangle = measure_triangle(directions(made)[:3], sigma, meter())
-        if triangle is None:
-            continue
+    for made, triangle in triangles(40, sigma):
         faces = onboard.sphere.around(made.boresight.astype(np.float32), meter()) if aided else None
         found = find_triangles(triangle, onboard, faces, meter())
         expected = within(onboard.areas, triangle.area, triangle.area_sigma)
@@ -70,10 +73,7 @@ def test_candidates_are_those_of_comparing_everything(sigma: float, aided: bool)
 
 def test_a_search_looks_at_less_than_a_hundredth_of_the_database() -> None:
     onboard = database()
-    for made in pictures(60, seed=1):
-        triangle = measure_triangle(directions(made)[:3], SIGMA, meter())
-        if triangle is None:
-            continue
+    for _, triangle in triangles(60, SIGMA, seed=1):
         for index, values, middle, sigma in (
             (onboard.area_index, onboard.areas, triangle.area, triangle.area_sigma),
             (onboard.moment_index, onboard.moments, triangle.moment, triangle.moment_sigma),

@@ -6,7 +6,6 @@ from cubestack.firmware_model.cubesense.hardware import Port
 from cubestack.firmware_model.cubesense.links.node import SEND_BYTES
 from cubestack.firmware_model.interface.codec.node_messages import AckError
 from cubestack.firmware_model.interface.cubesense import INTERFACE, codes, telemetry
-from cubestack.firmware_model.mcu.requests import Request
 
 from ..links_harness import Links
 
@@ -117,11 +116,8 @@ def test_reading_a_result_schedules_the_next(node: Links, identifier: int) -> No
     name = INTERFACE.telemetry(identifier).name
     values = node.telemetry(name)
     assert (values["Capture"], values["Detect"]) == (0, 0)
-    again = node.telemetry(f"Result{camera + 1}")
-    assert (again["Capture"], again["Detect"]) == (
-        codes.CaptureResult.PENDING,
-        codes.DetectResult.PENDING,
-    )
+    again, pending = node.telemetry(f"Result{camera + 1}"), codes.CaptureResult.PENDING
+    assert (again["Capture"], again["Detect"]) == (pending, codes.DetectResult.PENDING)
     node.run()
     assert node.done == [("measure", camera, sram, True)]
     assert node.woken
@@ -207,12 +203,8 @@ def test_processed_speaks_of_the_last_telecommand(node: Links) -> None:
 
 
 def test_a_telecommand_is_not_processed_while_it_runs(node: Links) -> None:
-    seen = set()
-
-    def look(_request: Request) -> None:
-        seen.add(node.telemetry("TcmdProcessed")["Processed"])
-
-    node.on_request = look
+    seen: set[int] = set()
+    node.on_request = lambda _request: seen.add(node.telemetry("TcmdProcessed")["Processed"])
     node.command("CaptureAndDetect")
     assert 0 in seen
     assert node.telemetry("TcmdProcessed")["Processed"] == 1

@@ -123,10 +123,8 @@ def tables_exist(factors: Sequence[float]) -> bool:
 def random_factors(rng: np.random.Generator) -> list[float]:
     match rng.integers(0, 3):
         case 0:  # what a telecommand can carry
-            return [
-                coefficient(int(rng.integers(-32768, 32768)), int(rng.integers(0, 256)))
-                for _ in range(5)
-            ]
+            carried = rng.integers((-32768, 0), (32768, 256), (5, 2)).tolist()
+            return [coefficient(*pair) for pair in carried]
         case 1:
             return [rng.normal() * size for size in (10, 1, 3e-3, 1e-5, 4e-8)]
         case _:  # lenses like ours

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.cubesense.vision.distortion import Projection, RadiusTable, byte_table
+from cubestack.firmware_model.cubesense.vision.distortion import RadiusTable
 from cubestack.firmware_model.cubesense.vision.edges import EdgeConfig
 from cubestack.firmware_model.cubesense.vision.nadir import NadirConfig, NadirResult, find_nadir
 from cubestack.firmware_model.interface.cubesense.codes import DetectResult, Reason
@@ -31,11 +31,6 @@ def measure(
 @pytest.fixture
 def ours(stereographic: RadiusTable) -> NadirConfig:
     return NadirConfig(stereographic)
-
-
-@pytest.fixture
-def published(meter: Meter) -> NadirConfig:
-    return NadirConfig(byte_table(meter), Projection.EQUIDISTANT, checked=False)
 
 
 def errors(
@@ -84,20 +79,17 @@ def test_a_radius_that_no_altitude_has(ours: NadirConfig) -> None:
     assert result.radius_deg == pytest.approx(angular_radius_deg(9000), abs=0.2)
 
 
-def test_edges_on_a_line_are_a_bad_fit(published: NadirConfig) -> None:
-    picture = np.zeros((ROWS, COLUMNS), np.uint8)
-    picture[:, 371:] = 200
-    no_columns = EdgeConfig(rim_px=226, sub_pixel=False)
-    assert measure(picture, published, no_columns).detect is DetectResult.BAD_FIT
-
-
-def test_without_a_circle_all_edges_are_dropped(ours: NadirConfig, meter: Meter) -> None:
-    picture = np.zeros((ROWS, COLUMNS), np.uint8)
-    picture[:, 371:] = 200
-    edges = edges_in(picture, meter)
+def test_without_a_circle_all_edges_are_dropped(
+    ours: NadirConfig, published: NadirConfig, meter: Meter
+) -> None:
+    line = np.zeros((ROWS, COLUMNS), np.uint8)
+    line[:, 371:] = 200
+    edges = edges_in(line, meter)
     result = find_nadir(edges, ours, meter)
     assert (result.detect, result.reason) == (DetectResult.BAD_FIT, Reason.NO_CIRCLE)
     assert (result.edges, result.dropped) == (0, len(edges))
+    whole_pixels = EdgeConfig(rim_px=226, sub_pixel=False)
+    assert measure(line, published, whole_pixels).detect is DetectResult.BAD_FIT
 
 
 def test_a_few_false_edges_are_dropped(ours: NadirConfig) -> None:

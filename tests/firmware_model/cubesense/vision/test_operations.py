@@ -2,6 +2,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from cubestack.firmware_model.cubesense.vision.circle import LeastSquaresCircle
 from cubestack.firmware_model.cubesense.vision.distortion import (
@@ -16,12 +17,14 @@ from cubestack.firmware_model.cubesense.vision.lens_check import invertible
 from cubestack.firmware_model.cubesense.vision.masks import Mask
 from cubestack.firmware_model.cubesense.vision.nadir import NadirConfig, find_nadir
 from cubestack.firmware_model.cubesense.vision.sample_search import Between, around_samples
-from cubestack.firmware_model.cubesense.vision.sun_centroid import SunConfig, find_sun
+from cubestack.firmware_model.cubesense.vision.sun_centroid import SunConfig, find_sun, window_bytes
+from cubestack.firmware_model.interface.cubesense.codes import DetectResult
+from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.pic18 import PIC18F45K20
 
 from ...operations import as_on_record
-from ..scenery import chequered, earth, edges_in, rough, sun, window
+from ..scenery import SUN_BORESIGHT, chequered, earth, edges_in, rough, sun, window
 
 PICTURES = {
     "Earth": earth(5, -7),
@@ -122,3 +125,72 @@ def test_listed_circle(meter: Meter) -> None:
     centre = LeastSquaresCircle(points.astype(np.float32), meter).centre()
     assert centre is not None
     as_on_record("listed circle", meter, [*centre], 0.01)
+
+
+# --- CubeSense thesis, section 7.4: both times are predicted, as no cost is fitted to either ---
+
+IMAGING_S = 0.048
+
+
+def bright(pixels: int) -> NDArray[np.uint8]:
+    data = np.zeros(window_bytes(), np.uint8)
+    data[:4] = (100, 1, 100, 0)
+    data[4 : 4 + pixels] = 255
+    return data
+
+
+def sun_seconds(data: NDArray[np.uint8], config: SunConfig) -> float:
+    meter = Meter(PIC18F45K20)
+    meter.charge(strobe_byte=len(data))
+    assert find_sun(data, config, meter).detect is DetectResult.SUCCESS
+    return PIC18F45K20.seconds(meter.total)
+
+
+def nadir_seconds(config: NadirConfig, edges: EdgeConfig) -> float:
+    times = []
+    for alpha, beta in ((0, 0), (10, 0), (0, 10), (7, -9), (20, 5)):
+        meter = Meter(PIC18F45K20)
+        meter.charge(scan_byte=FULL_SIZE.scan_clocks)
+        found = edges_in(earth(alpha, beta), meter, edges)
+        assert find_nadir(found, config, meter).detect is DetectResult.SUCCESS
+        times.append(PIC18F45K20.seconds(meter.total))
+    return float(np.mean(times))
+
+
+@pytest.fixture
+def published_sun(meter: Meter) -> SunConfig:
+    return SunConfig(byte_table(meter), printed=True)
+
+
+def test_sun_time_depends_on_the_number_of_its_pixels(published_sun: SunConfig) -> None:
+    times = [IMAGING_S + sun_seconds(bright(n), published_sun) for n in (43, 69, 109)]
+    # The published 70.4 ms are those of a Sun of about 63 pixels.
+    assert times == pytest.approx([0.0646, 0.0720, 0.0835], abs=2e-4)
+
+
+def test_a_sun_of_7_px_has_the_pixels_of_the_fit(published_sun: SunConfig, meter: Meter) -> None:
+    rng = np.random.default_rng(2)
+    places = np.array(SUN_BORESIGHT) + rng.uniform(0, 1, (30, 2))
+    counts = [find_sun(window(sun(at, 7)), published_sun, meter).pixels for at in places]
+    assert np.mean(counts) == pytest.approx(109, rel=0.05)
+
+
+def test_the_nadir_time(published: NadirConfig) -> None:
+    whole_pixels = EdgeConfig(sub_pixel=False)
+    predicted = IMAGING_S + nadir_seconds(published, whole_pixels)
+    # Published are 245 ms.
+    assert predicted == pytest.approx(0.2456, abs=0.002)
+
+
+def test_ours_takes_longer(
+    published_sun: SunConfig,
+    published: NadirConfig,
+    equidistant: RadiusTable,
+    stereographic: RadiusTable,
+) -> None:
+    ours = nadir_seconds(NadirConfig(stereographic), EdgeConfig(sharp=True))
+    extra = ours - nadir_seconds(published, EdgeConfig(sub_pixel=False))
+    assert 0.1 < extra < 0.2  # a second fit, of distances, and its uncertainty
+    data = window(sun(np.array(SUN_BORESIGHT), 7))
+    extra = sun_seconds(data, SunConfig(equidistant)) - sun_seconds(data, published_sun)
+    assert 0 < extra < 0.006

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from cubestack.firmware_model.cubesense.vision import nadir, sun_centroid
-from cubestack.firmware_model.cubesense.vision.distortion import Projection, RadiusTable, byte_table
+from cubestack.firmware_model.cubesense.vision.distortion import RadiusTable, byte_table
 from cubestack.firmware_model.cubesense.vision.edges import MAX_EDGES, EdgeConfig
 from cubestack.firmware_model.interface.cubesense.codes import DetectResult
 from cubestack.firmware_model.interface.cubesense.fpga import READ_OUTS
@@ -108,11 +108,6 @@ def lookup(meter: Meter) -> list[int]:
     return list(map(int, byte_table(meter).differences))
 
 
-@pytest.fixture
-def printed(meter: Meter) -> nadir.NadirConfig:
-    return nadir.NadirConfig(byte_table(meter), Projection.EQUIDISTANT, checked=False)
-
-
 @pytest.mark.parametrize(
     ("listing", "rim", "last"), [(False, (371, 236), 448), (True, (367, 237), 224)]
 )
@@ -147,11 +142,11 @@ def test_gateware_and_program_as_flown_are_right_together(meter: Meter) -> None:
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_nadir(meter: Meter, printed: nadir.NadirConfig, lookup: list[int], seed: int) -> None:
+def test_nadir(meter: Meter, published: nadir.NadirConfig, lookup: list[int], seed: int) -> None:
     rng = np.random.default_rng(seed)
     alpha, beta = rng.uniform(-35, 35, 2)
     edges = edges_in(earth(alpha, beta, rng=rng), meter, EdgeConfig(sub_pixel=False))
-    found = nadir.find_nadir(edges, printed, meter)
+    found = nadir.find_nadir(edges, published, meter)
     assert [found.x, found.y] == calc_nadir((edges.points // 32).tolist(), lookup)
     assert (found.detect, found.dropped, found.radius_deg) == (DetectResult.SUCCESS, 0, 0)
 
@@ -166,10 +161,10 @@ def test_sun(meter: Meter, lookup: list[int], seed: int) -> None:
     assert [found.x, found.y] == calc_sun([int(byte) for byte in data], lookup)
 
 
-def test_costs_equal_the_listing_s_operations(meter: Meter, printed: nadir.NadirConfig) -> None:
+def test_costs_equal_the_listing_s_operations(meter: Meter, published: nadir.NadirConfig) -> None:
     edges = edges_in(earth(3, -8), meter, EdgeConfig(sub_pixel=False))
     n, before = len(edges), Counter(meter.counts)
-    nadir.find_nadir(edges, printed, meter)
+    nadir.find_nadir(edges, published, meter)
     spent = Counter(meter.counts) - before
     assert {name: count for name, count in spent.items() if name.startswith("f32")} == {
         "f32_sqrt": n,
@@ -194,11 +189,11 @@ def test_any_sun_pixel(meter: Meter, printed: bool, detect: str, first: tuple[in
 
 @pytest.mark.parametrize("checked", [True, False])
 def test_accepts_any_circle(
-    meter: Meter, printed: nadir.NadirConfig, stereographic: RadiusTable, checked: bool
+    meter: Meter, published: nadir.NadirConfig, stereographic: RadiusTable, checked: bool
 ) -> None:
     picture = earth(10, 5)
     picture[:, :371] = 34  # lit from the right: the terminator is a straight line
-    for config in (nadir.NadirConfig(stereographic, checked=checked), printed):
+    for config in (nadir.NadirConfig(stereographic, checked=checked), published):
         found = nadir.find_nadir(edges_in(picture, meter), config, meter)
         assert found.detect is DetectResult.SUCCESS
         right = error_deg((found.alpha / 100, found.beta / 100), (10, 5)) < 0.3

@@ -47,25 +47,12 @@ def test_disc_with_sharp_edge_is_uncertain(ours: SunConfig, meter: Meter, bloom_
     assert result.sigma_alpha == result.sigma_beta == 4800
 
 
-@pytest.mark.parametrize("apart", [(8, 7), (-8, 7), (0, 9), (9, 3)], ids=str)
-def test_rejects_two_lights_in_a_window(
-    ours: SunConfig, meter: Meter, apart: tuple[int, int]
-) -> None:
-    """Neither of them is whole, and the mean is between them."""
-    one = np.array([300.0, 200.0])
-    picture = np.maximum(sun(one, 5), sun(one + apart, 5))
-    result = find_sun(window(picture), ours, meter)
-    assert result.reason is Reason.NOT_ROUND
-    assert result.detect is DetectResult.SUN_NOT_FOUND
-
-
 def test_the_sun_has_a_standard_deviation_and_a_reason(ours: SunConfig, meter: Meter) -> None:
-    result = find_sun(window(sun(np.array([300.3, 200.6]), 6)), ours, meter)
+    data = window(sun(np.array([300.3, 200.6]), 6))
+    result = find_sun(data, ours, meter)
     assert result.reason is Reason.MEASURED
     assert 2 <= result.sigma_alpha == result.sigma_beta <= 5
-    printed = find_sun(
-        window(sun(np.array([300.3, 200.6]), 6)), SunConfig(ours.table, printed=True), meter
-    )
+    printed = find_sun(data, SunConfig(ours.table, printed=True), meter)
     assert (printed.reason, printed.sigma_alpha) == (Reason.NONE, 0)
 
 
@@ -133,13 +120,16 @@ def hollow() -> NDArray[np.uint8]:
 
 
 def steps(apart: int) -> NDArray[np.uint8]:
-    """Two squares one below the other, the lower one ``apart`` columns to the right, at a corner of
-    the window, by which nothing is round.
-    """
+    """Two squares in a corner, the lower one ``apart`` columns to the right: nothing is round."""
     data = squares(0, 0)
     pixels = data[4:].reshape(15, 15)
     pixels[:5, :5] = pixels[5:10, apart : apart + 5] = 255
     return data
+
+
+def two_lights(*apart: int) -> NDArray[np.uint8]:
+    one = np.array([300.0, 200.0])
+    return window(np.maximum(sun(one, 5), sun(one + apart, 5)))
 
 
 def nowhere() -> NDArray[np.uint8]:
@@ -161,6 +151,9 @@ def nowhere() -> NDArray[np.uint8]:
         (hollow(), Reason.NOT_ROUND),
         (steps(5), Reason.NOT_ROUND),  # no column in common
         (steps(4), Reason.SHARP),
+        (window(np.full((ROWS, COLUMNS), 255, np.uint8)), Reason.TOO_LARGE),
+        # Two lights: neither of them is whole, and the mean is between them.
+        *((two_lights(*apart), Reason.NOT_ROUND) for apart in ((8, 7), (-8, 7), (0, 9), (9, 3))),
     ],
 )
 def test_each_rejection_reason_has_an_example(
@@ -184,11 +177,6 @@ def test_masked_pixels_do_not_count(ours: SunConfig, meter: Meter) -> None:
     masked = SunConfig(ours.table, masks=(Mask(280, 320, 180, 220),))
     assert find_sun(data, ours, meter).detect is DetectResult.SUCCESS
     assert find_sun(data, masked, meter).detect is DetectResult.SUN_NOT_FOUND
-
-
-def test_a_wholly_bright_window_is_no_sun(ours: SunConfig, meter: Meter) -> None:
-    result = find_sun(window(np.full((ROWS, COLUMNS), 255, np.uint8)), ours, meter)
-    assert (result.pixels, result.reason) == (225, Reason.TOO_LARGE)
 
 
 @pytest.mark.parametrize(("distance", "found"), [(224.0, True), (229.0, False)])

@@ -80,20 +80,16 @@ def test_a_long_frame_is_reported_once_at_its_end() -> None:
     assert events(decoder, encode_frame(bytes(LIMIT + 1))) == [FrameEvent.TOO_LONG]
 
 
-def test_a_start_inside_a_frame_is_incomplete_and_begins_anew() -> None:
-    stream = encode_frame(b"abc")[:-2] + encode_frame(b"de")
-    assert events(FrameDecoder(LIMIT), stream) == [FrameEvent.INCOMPLETE, b"de"]
-
-
-def test_an_unknown_escape_drops_the_frame() -> None:
-    stream = bytes.fromhex("1F7F 80 1F00") + encode_frame(b"de")
-    assert events(FrameDecoder(LIMIT), stream) == [FrameEvent.PROTOCOL_ERROR, b"de"]
-
-
-@pytest.mark.parametrize("stray", ["00", "1F00", "1FFF", "1F"])
-def test_bytes_outside_of_a_frame_are_a_protocol_error(stray: str) -> None:
-    found = events(FrameDecoder(LIMIT), bytes.fromhex(stray) + encode_frame(b"de"))
-    assert found == [FrameEvent.PROTOCOL_ERROR, b"de"]
+@pytest.mark.parametrize(
+    ("lost", "event"),
+    [
+        (b"\x1f\x7fabc", FrameEvent.INCOMPLETE),  # a start inside of a frame begins anew
+        (b"\x1f\x7f\x80\x1f\x00", FrameEvent.PROTOCOL_ERROR),  # an unknown escape drops the frame
+        *((b, FrameEvent.PROTOCOL_ERROR) for b in (b"\0", b"\x1f\0", b"\x1f\xff", b"\x1f")),
+    ],
+)
+def test_what_is_lost_before_a_good_frame_is_one_error(lost: bytes, event: FrameEvent) -> None:
+    assert events(FrameDecoder(LIMIT), lost + encode_frame(b"de")) == [event, b"de"]
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,15 @@ from hypothesis import strategies as st
 
 from cubestack.firmware_model.interface.cameras.registers import RegisterAccess
 from cubestack.firmware_model.interface.codec import attitude_quality
-from cubestack.firmware_model.interface.codec.field import InterfaceError, bool1, i16, u8, u16, u32
+from cubestack.firmware_model.interface.codec.field import (
+    Field,
+    InterfaceError,
+    bool1,
+    i16,
+    u8,
+    u16,
+    u32,
+)
 from cubestack.firmware_model.interface.codec.message import Interface, Message, MessageKind
 from cubestack.firmware_model.interface.codec.node_messages import AckError, node_telemetry
 from cubestack.firmware_model.interface.codec.register_pointer import PointerMap, PointerRegister
@@ -96,26 +104,36 @@ def test_errors_name_the_offender_in_one_line(call: Callable[[], object], messag
     assert "\n" not in str(caught.value)
 
 
+def declared(*fields: Field, number: int = 1, **more: Any) -> Message:
+    return Message(number, "M", "").of(*fields, **more)
+
+
+def node_of(*telecommands: Message, telemetries: tuple[Message, ...] = ()) -> Interface:
+    return Interface("Node", 1, 0x1A, 57_600, telecommands, telemetries, AckError)
+
+
 @pytest.mark.parametrize(
-    ("arguments", "message"),
+    ("call", "message"),
     [
-        ((1, u8("a", ""), u8("a", "")), "two fields of one name"),
-        ((256,), "ID 256 is not a byte"),
-        ((1, u8("a", "", low=1)), "reset value of a"),
-        ((1, u8("a", "", high_by=("z", {}))), "no field 'z'"),
+        (lambda: declared(u8("a", ""), u8("a", "")), "two fields of one name"),
+        (lambda: declared(number=256), "ID 256 is not a byte"),
+        (lambda: declared(u8("a", "", low=1)), "reset value of a"),
+        (lambda: declared(u8("a", "", high_by=("z", {}))), "no field 'z'"),
+        (lambda: declared(u8("a", ""), ordered=(("a", "z"),)), "no field 'z'"),
+        (lambda: node_of(MIXED), "Mixed: ID 200 is no telecommand's"),
+        (lambda: node_of(telemetries=(WINDOW,)), "Window: ID 20 is no telemetry's"),
+        (lambda: node_of(WINDOW, Message(20, "Other", "")), "Other: ID 20 is taken"),
+        (lambda: node_of(WINDOW, Message(21, "window", "")), "two telecommands of one name"),
+        (lambda: NODE.telecommand("windw"), "Node has no telecommand 'windw'; did you mean Wind"),
+        (lambda: NODE.telemetry(131), "Node has no telemetry frame 131; known: Mixed"),
     ],
 )
-def test_rejects_wrong_declarations(arguments: tuple[Any, ...], message: str) -> None:
+def test_rejects_wrong_declarations(call: Callable[[], object], message: str) -> None:
     with pytest.raises(InterfaceError, match=message):
-        Message(arguments[0], "M", "").of(*arguments[1:])
+        call()
 
 
-def test_an_order_is_one_of_its_own_fields() -> None:
-    with pytest.raises(InterfaceError, match="no field 'z'"):
-        Message(1, "M", "").of(u8("a", ""), ordered=(("a", "z"),))
-
-
-NODE = Interface("Node", 1, 0x1A, 57_600, (WINDOW,), (MIXED,), AckError)
+NODE = node_of(WINDOW, telemetries=(MIXED,))
 
 
 def test_messages_and_fields_are_found_by_name_in_any_case_and_messages_by_identifier() -> None:
@@ -125,34 +143,11 @@ def test_messages_and_fields_are_found_by_name_in_any_case_and_messages_by_ident
     assert NODE.find(21) is None
 
 
-def test_unknown_messages_get_a_suggestion() -> None:
-    with pytest.raises(InterfaceError, match="Node has no telecommand 'windw'; did you mean Wind"):
-        NODE.telecommand("windw")
-    with pytest.raises(InterfaceError, match="Node has no telemetry frame 131; known: Mixed"):
-        NODE.telemetry(131)
-
-
 def test_an_unsupported_message_is_unknown_to_the_node_only() -> None:
     later = Message(201, "Later", "", supported=False)
-    node = Interface("Node", 1, 0x1A, 57_600, (), (later,), AckError)
+    node = node_of(telemetries=(later,))
     assert node.telemetry("Later") is later
     assert node.find(201) is None
-
-
-@pytest.mark.parametrize(
-    ("telecommands", "telemetries", "message"),
-    [
-        ((MIXED,), (), "Mixed: ID 200 is no telecommand's"),
-        ((), (WINDOW,), "Window: ID 20 is no telemetry's"),
-        ((WINDOW, Message(20, "Other", "")), (), "Other: ID 20 is taken"),
-        ((WINDOW, Message(21, "window", "")), (), "two telecommands of one name"),
-    ],
-)
-def test_rejects_wrong_interfaces(
-    telecommands: tuple[Message, ...], telemetries: tuple[Message, ...], message: str
-) -> None:
-    with pytest.raises(InterfaceError, match=message):
-        Interface("Node", 1, 0x1A, 57_600, telecommands, telemetries, AckError)
 
 
 def test_choices_are_those_of_messages_and_registers_but_not_the_error_codes() -> None:
@@ -161,7 +156,7 @@ def test_choices_are_those_of_messages_and_registers_but_not_the_error_codes() -
 
     error = Message(201, "Last", "").of(u8("error", "", choices=AckError))
     register = PointerRegister(0, RegisterAccess.READ_WRITE, u8("level", "", choices=Level))
-    bare = Interface("Node", 1, 0x1A, 57_600, (), (error,), AckError)
+    bare = node_of(telemetries=(error,))
     assert bare.choices == ()
     assert replace(bare, registers=PointerMap(0x1C, (register,))).choices == (Level,)
 

@@ -15,15 +15,9 @@ from cubestack.firmware_model.interface.cubestar import INTERFACE, ImageBlockSiz
 PRINTED = Path(__file__).with_name("printed_layouts.txt").read_text(encoding="ascii")
 
 STEPPING = {
-    "StarPositions",
-    "BodyUnitVectors",
-    "IDStarsDetails",
-    "InertialUnitVectors",
-    "StarDetails",
-    "HipparcosNumber",
+    *("StarPositions", "BodyUnitVectors", "IDStarsDetails"),
+    *("InertialUnitVectors", "StarDetails", "HipparcosNumber"),
 }
-
-
 BY_ID = {message.id: message for message in INTERFACE.messages}
 
 
@@ -142,11 +136,8 @@ def test_published_ranges_at_limits(name: str, field: str, low: int, high: int, 
 
 def test_the_thesis_limit_of_invalid_areas_can_be_written_back() -> None:
     message = INTERFACE.telecommand("setDetectionVariables")
-    allowed = [
-        n
-        for n in range(256)
-        if not message.violations(message.reset_values() | {"MaxInvalidStars": n})
-    ]
+    tried = {n: message.reset_values() | {"MaxInvalidStars": n} for n in range(256)}
+    allowed = [n for n, values in tried.items() if not message.violations(values)]
     assert allowed == [*range(16), 50]
 
 
