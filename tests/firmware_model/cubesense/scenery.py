@@ -24,12 +24,7 @@ _DENSE = np.linspace(0, 340, 200_001)
 
 
 def distort(radius: NDArray[np.float64] | float) -> NDArray[np.float64]:
-    return np.asarray(
-        -2.5572e-6 * np.power(radius, 3)
-        + 7.6076e-5 * np.power(radius, 2)
-        + 0.9953 * radius
-        + 0.1036
-    )
+    return np.asarray(np.polyval([-2.5572e-6, 7.6076e-5, 0.9953, 0.1036], radius))
 
 
 def undistort(radius: NDArray[np.float64] | float) -> NDArray[np.float64]:

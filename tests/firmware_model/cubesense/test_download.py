@@ -68,9 +68,8 @@ def test_a_measurement_in_between_costs_a_new_beginning_only(node: Links) -> Non
 
 def test_a_frame_further_on_in_the_other_memory_is_read_there(node: Links) -> None:
     size = codes.ImageSize.SIDE_64
-    for begun, (sram, number) in enumerate(
-        ((codes.Sram.SRAM1, 10), (codes.Sram.SRAM2, 15)), start=1
-    ):
+    places = (codes.Sram.SRAM1, 10), (codes.Sram.SRAM2, 15)
+    for begun, (sram, number) in enumerate(places, start=1):
         node.send("StartImageDownload", Sram=sram, Size=size)
         node.send("NextImageFrame", Frame=number)  # the first one is not read
         node.run()

@@ -1,6 +1,4 @@
-"""Recorded sessions; and nonsense on every bus at any time: nothing breaks, and the next good
-message gets its answer.
-"""
+"""Recorded sessions; nonsense on every bus at any time, after which good messages get answers."""
 
 from collections.abc import Callable
 

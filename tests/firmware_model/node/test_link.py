@@ -51,13 +51,8 @@ class Canned(Runner, HostSide):
             self.served: SatelliteLink = CubeStarLink(self.meter, state, self.values)
         else:
             self.state = other = AramisState(self.flash)
-            self.served = AramisLink(
-                self,  # type: ignore[arg-type]
-                self.meter,
-                other,
-                self.values,
-                lambda _command: None,
-            )
+            shown = self.values, lambda _command: None
+            self.served = AramisLink(self, self.meter, other, *shown)  # type: ignore[arg-type]
 
     @property
     def link(self) -> SatelliteLink:
