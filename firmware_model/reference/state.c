@@ -3,8 +3,7 @@
 #include "state.h"
 
 #include "core.h"
-#include "drivers/flash.h"
-#include "drivers/retention.h"
+#include "drivers/memories.h"
 
 #define MAGIC 0x52545343u /* "CSTR" */
 

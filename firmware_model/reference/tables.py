@@ -2,12 +2,18 @@
 
 The C header of the interface has offsets; these tables have the rest: the values that a telecommand
 may have and the flags for others, the place of each setting and the telemetry that shows it, the
-states that telecommands report. ``generate`` writes them.
+states that telecommands report.
+
+`python -m cubestack.firmware_model.reference.tables FOLDER` writes them, the pins and the part's
+registers. The interface's own C header and the catalogue come from the host's tools; see the
+Makefile.
 """
 
 import math
+import sys
 from collections.abc import Callable, Iterator
 from itertools import groupby
+from pathlib import Path
 
 from cubestack.firmware_model.cubestar import state, telemetry
 from cubestack.firmware_model.cubestar.link import TASKS
@@ -17,7 +23,10 @@ from cubestack.firmware_model.interface.codec.field import Field
 from cubestack.firmware_model.interface.codec.message import Message, MessageKind
 from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.firmware_model.interface.cubestar.codes import TaskStatus
+from cubestack.firmware_model.interface.cubestar.processor_pins import pins_header
 from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitches
+from cubestack.firmware_model.interface.efm32gg import LAYOUTS
+from cubestack.firmware_model.interface.efm32gg.c_header import c_header
 from cubestack.firmware_model.node import commands, link
 from cubestack.firmware_model.node import state as node_state
 
@@ -28,6 +37,19 @@ STEPS = tuple(
 
 _TYPES = ("bool1", "u8", "enum8", "u16", "i16", "u32", "f32")
 _U8, _LARGEST = 255, 65_535
+
+
+def generate(folder: Path) -> None:
+    """Write the files into ``folder``, which is created if needed."""
+    folder.mkdir(parents=True, exist_ok=True)
+    texts = {
+        "cubestar_tables.h": header(),
+        "cubestar_tables.c": source(),
+        "pins.h": pins_header(),
+        "efm32gg.h": c_header(LAYOUTS),
+    }
+    for name, text in texts.items():
+        (folder / name).write_text(text, encoding="ascii")
 
 
 def header() -> str:
@@ -274,3 +296,7 @@ def _ranges(last: int, allows: Callable[[int], bool]) -> list[tuple[int, int]]:
         else:
             found.append((raw, raw))
     return found
+
+
+if __name__ == "__main__":
+    generate(Path(sys.argv[1]))

@@ -10,7 +10,7 @@
 #include "core.h"
 #include "efm32gg.h"
 #include "state.h"
-#include "watchdog.h"
+#include "reset.h"
 
 #define WAIT_STATES_2 4u /* above 32 MHz */
 #define HFXO_ABOVE_32_MHZ 3u

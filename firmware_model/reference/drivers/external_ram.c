@@ -2,7 +2,7 @@
 /* The SRAM on the external bus. EFM32GG Reference Manual, chapter 14.
  *
  * Eight data lines and 24 address lines, latched in two steps, for an SRAM of 55 ns. */
-#include "external_ram.h"
+#include "memories.h"
 
 #include "efm32gg.h"
 #include "gpio.h"

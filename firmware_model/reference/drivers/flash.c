@@ -4,11 +4,11 @@
  * They are in the upper half of the flash; the program runs from the lower one, which can be read
  * while the upper one is written. The routines that write are in RAM nevertheless, as the manual
  * requires for parts without that feature. */
-#include "flash.h"
+#include "memories.h"
 
 #include "core.h"
 #include "efm32gg.h"
-#include "watchdog.h"
+#include "reset.h"
 
 #define FLASH_END 0x00100000u
 #define PAGE_BYTES 4096u

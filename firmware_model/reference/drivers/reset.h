@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-2-Clause */
-/* Resets and their causes. EFM32GG Reference Manual, chapter 9. */
+/* Resets and their causes, and the watchdog. EFM32GG Reference Manual, chapters 9 and 12. */
 #pragma once
 
 #include <stdint.h>
@@ -8,3 +8,7 @@
 uint8_t reset_cause_taken(void);
 
 _Noreturn void reset_processor(void);
+
+/* Resets the processor if it is not fed for two seconds. */
+void watchdog_start(void);
+void watchdog_feed(void);

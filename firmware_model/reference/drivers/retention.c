@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-2-Clause */
 /* Retention registers of BURTC; they take whole words only. */
-#include "retention.h"
+#include "memories.h"
 
 #include <stdint.h>
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-2-Clause */
 /* Watchdog, clocked by the 1 kHz oscillator that always runs. */
-#include "watchdog.h"
+#include "reset.h"
 
 #include "efm32gg.h"
 

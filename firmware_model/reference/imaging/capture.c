@@ -6,7 +6,7 @@
 
 #include "drivers/clock.h"
 #include "drivers/fpga.h"
-#include "drivers/watchdog.h"
+#include "drivers/reset.h"
 #include "image_sensor.h"
 #include "state.h"
 #include "supply_monitor.h"

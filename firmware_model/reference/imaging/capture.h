@@ -9,7 +9,7 @@
 #include <stdint.h>
 
 #include "cubestar_tables.h"
-#include "drivers/external_ram.h"
+#include "drivers/memories.h"
 
 #define PICTURE EXTERNAL_MEMORY
 #define PICTURE_COLUMNS 1024

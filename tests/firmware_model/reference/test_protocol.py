@@ -16,7 +16,7 @@ from cubestack.firmware_model.interface.codec.frames import FrameDecoder, FrameE
 from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.firmware_model.node.link import longest_command
-from cubestack.firmware_model.reference.generate import generate
+from cubestack.firmware_model.reference.tables import generate
 from cubestack.host.export.c_header import c_header
 
 SOURCES = Path(__file__).parents[3] / "firmware_model" / "reference"

@@ -1,6 +1,7 @@
 import math
 import re
 from itertools import pairwise
+from pathlib import Path
 
 import pytest
 
@@ -75,3 +76,13 @@ def test_every_rule_finds_its_ranges_in_the_table(monkeypatch: pytest.MonkeyPatc
     assert rows[::2] == [("0", "5")] * len(lists)
     assert {low for low, _ in rows[1::2]} == {"7"}
     assert len(rows) == 2 * len(lists)
+
+
+def test_creates_named_output_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tables, "header", lambda: "the header")  # all of them take a second
+    monkeypatch.setattr(tables, "source", lambda: "the source")
+    folder = tmp_path / "build" / "generated"
+    tables.generate(folder)
+    names = {path.name for path in folder.iterdir()}
+    assert names == {"cubestar_tables.h", "cubestar_tables.c", "pins.h", "efm32gg.h"}
+    assert (folder / "cubestar_tables.c").read_text() == "the source"

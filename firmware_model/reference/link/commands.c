@@ -9,7 +9,7 @@
 #include "core.h"
 #include "drivers/clock.h"
 #include "drivers/uart.h"
-#include "drivers/watchdog.h"
+#include "drivers/reset.h"
 #include "link/frames.h"
 #include "imaging/image_sensor.h"
 #include "imaging/processing.h"
