@@ -99,7 +99,6 @@ def test_counts_streamed_frames(node: Any, uart: Any) -> None:
 
 def test_counts_transfers_without_acknowledge(node: Any) -> None:
     client = over_i2c(node)
-    assert isinstance(client, I2cClient)
     client._bus.failures = 1  # type: ignore[attr-defined]
     client.telemetry("Identification")
     assert client.exchanges == Exchanges(sent=2, answered=1, late=1, repeated=1)
@@ -110,7 +109,6 @@ def test_counts_transfers_without_acknowledge(node: Any) -> None:
 
 def test_counts_register_transfers() -> None:
     registers = device("cubesense").interface.registers
-    assert registers is not None
     slave = Slave()
     slave.failures = [0]
     client = RegisterClient(slave, registers, wait=lambda _s: None)

@@ -5,7 +5,6 @@ import pytest
 from cubestack.firmware_model.interface.codec.field import InterfaceError
 from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.host.clients.i2c import I2cClient
-from cubestack.host.clients.node import NodeClient
 from cubestack.host.errors import CommandRefusedError, NoAnswerError, NotSupportedError
 
 from ..conftest import I2cLink, over_i2c
@@ -69,10 +68,8 @@ def test_silent_address_is_named(i2c: Any) -> None:
         client.command("Reset")
 
 
-@pytest.mark.parametrize("bus", ["uart", "i2c"])
-def test_unsupported_telemetry_is_not_requested(bus: str, node: Any, uart: Any, i2c: Any) -> None:
-    client = NodeClient(uart, INTERFACE) if bus == "uart" else I2cClient(i2c, INTERFACE)
+def test_unsupported_telemetry_is_not_requested(either_client: Any, node: Any) -> None:
     (name,) = (message.name for message in INTERFACE.telemetries if not message.supported)
     with pytest.raises(NotSupportedError, match=f"telemetry {name} is not supported by the node"):
-        client.telemetry(name)
+        either_client.telemetry(name)
     assert node.log == []

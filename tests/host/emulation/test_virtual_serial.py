@@ -47,23 +47,23 @@ def opened(line: Line, timeout: float | None) -> VirtualSerial:
 COMING = ((5.25, b"ab"), (5.5, b"cd\n"), (8.0, b"e"))
 
 
-def test_read_returns_after_its_last_byte() -> None:
+@pytest.mark.parametrize(
+    ("timeout", "reads"),
+    [
+        (1.0, [(3, b"abc", 5.5), (2, b"d\n", 5.5)]),
+        (1.0, [(9, b"abcd\n", 6.0), (1, b"", 7.0)]),
+        (None, [(6, b"abcd\ne", 8.0)]),
+        (0.0, [(3, b"", 5.0)]),
+        (0.3, [(3, b"ab", 5.3), (1, b"c", 5.5), (2, b"d\n", 5.5)]),
+    ],
+)
+def test_read_returns_after_its_last_byte_or_the_timeout(timeout: Any, reads: Any) -> None:
     line = Line(*COMING)
-    port = opened(line, 1.0)
-    assert port.read(3) == b"abc"
-    assert line.now_s == 5.5
-    assert port.read(2) == b"d\n"
-    assert line.now_s == 5.5
+    port = opened(line, timeout)
+    for size, found, until_s in reads:
+        assert port.read(size) == found
+        assert line.now_s == pytest.approx(until_s)
     assert port.in_waiting == 0
-
-
-def test_read_times_out_with_what_arrived() -> None:
-    line = Line(*COMING)
-    port = opened(line, 1.0)
-    assert port.read(9) == b"abcd\n"
-    assert line.now_s == pytest.approx(6.0)
-    assert port.read(1) == b""
-    assert line.now_s == pytest.approx(7.0)
 
 
 def test_readline_stops_at_the_newline() -> None:
@@ -74,6 +74,7 @@ def test_readline_stops_at_the_newline() -> None:
     assert port.readline() == b""
     assert line.now_s == pytest.approx(6.5)
     assert port.timeout == 1.0
+    assert opened(Line((900.0, b"x\n")), None).readline() == b"x\n"
 
 
 @pytest.mark.parametrize(
@@ -89,14 +90,6 @@ def test_read_until_stops_at_text_size_or_timeout(
 @pytest.mark.parametrize(("size", "found"), [(-1, b"abcd\n"), (0, b""), (2, b"ab")])
 def test_readline_has_a_maximum_size(size: int, found: bytes) -> None:
     assert opened(Line(*COMING), 1.0).readline(size) == found
-
-
-def test_read_without_a_timeout_waits() -> None:
-    line = Line(*COMING)
-    port = opened(line, None)
-    assert port.read(6) == b"abcd\ne"
-    assert line.now_s == 8.0
-    assert opened(Line((900.0, b"x\n")), None).readline() == b"x\n"
 
 
 def test_timeout_0_returns_at_once() -> None:

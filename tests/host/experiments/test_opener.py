@@ -1,3 +1,4 @@
+from contextlib import nullcontext
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -9,8 +10,6 @@ from cubestack.host.devices.registry import device
 from cubestack.host.experiments import opener
 from cubestack.host.experiments.opener import MeasureOptions, Opener
 from cubestack.host.experiments.scene_experiment import SceneExperiment
-
-PLAN = "[[fault]]\nkind = 'uart-drop'\nat_s = 1.0\n"
 
 
 class Emulated:
@@ -81,19 +80,23 @@ def test_experiment_options_override_user_options(made: list[Emulated]) -> None:
     assert (emulated.plans, emulated.closed) == ([], 0)
 
 
-@pytest.mark.parametrize("in_a_file", [True, False])
-def test_loads_a_fault_plan(made: list[Emulated], tmp_path: Path, in_a_file: bool) -> None:
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    """A fault plan."""
     path = tmp_path / "plan.toml"
-    path.write_text(PLAN, "utf-8")
+    path.write_text("[[fault]]\nkind = 'uart-drop'\nat_s = 1.0\n", "utf-8")
+    return path
+
+
+@pytest.mark.parametrize("in_a_file", [True, False])
+def test_loads_a_fault_plan(made: list[Emulated], path: Path, in_a_file: bool) -> None:
     Opener(device("cubestar"))(None, seed=0, faults=path if in_a_file else load_plan(path))
     assert [len(plan.faults) for plan in made[0].plans] == [1]
 
 
 def test_invalid_plan_closes_the_device(
-    made: list[Emulated], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    made: list[Emulated], path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path = tmp_path / "plan.toml"
-    path.write_text(PLAN, "utf-8")
     monkeypatch.setattr(Emulated, "complaint", ValueError("no such thing"))
     with pytest.raises(ValueError, match="no such thing"):
         Opener(device("cubestar"))(None, seed=0, faults=path)
@@ -118,17 +121,9 @@ def measure(device: Any) -> tuple[float | None, float | None, bool]:
     return found, None if found is None else found - device.scene, found is not None
 
 
-class Opened(SimpleNamespace):
-    """A stub of an opener and its device."""
-
-    def __call__(self, scene: Any, **_options: Any) -> "Opened":
-        self.scene = scene
-        return self
-
-    def __enter__(self) -> "Opened":
-        return self
-
-    def __exit__(self, *_error: object) -> None: ...
+def opened(scene: Any, **_options: Any) -> Any:
+    """Powers up a stub of a device."""
+    return nullcontext(SimpleNamespace(scene=scene))
 
 
 def experiment(columns: tuple[str, ...] = COLUMNS) -> SceneExperiment:
@@ -137,7 +132,7 @@ def experiment(columns: tuple[str, ...] = COLUMNS) -> SceneExperiment:
 
 
 def test_each_frame_has_its_own_scene() -> None:
-    results = list(experiment().run(Opened(), MeasureOptions(frames=3)))
+    results = list(experiment().run(opened, MeasureOptions(frames=3)))
     assert [result.as_dict() for result in results] == [
         {"found_deg": 0.5, "error_deg": -0.5, "right": True},
         {"found_deg": 1.5, "error_deg": -0.5, "right": True},
@@ -147,7 +142,7 @@ def test_each_frame_has_its_own_scene() -> None:
 
 def test_table_and_summary() -> None:
     one = experiment()
-    results = list(one.run(Opened(), MeasureOptions(frames=3)))
+    results = list(one.run(opened, MeasureOptions(frames=3)))
     assert one.columns == ("found deg", "error deg", "right")
     assert [one.row(number, result) for number, result in enumerate(results)] == [
         ("0.5", "-0.5", "True"),
@@ -160,4 +155,4 @@ def test_table_and_summary() -> None:
 
 def test_measure_must_return_a_value_for_each_column() -> None:
     with pytest.raises(ValueError, match="measure must return found_deg, not 3 values"):
-        next(experiment(("found_deg",)).run(Opened(), MeasureOptions()))
+        next(experiment(("found_deg",)).run(opened, MeasureOptions()))

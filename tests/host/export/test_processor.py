@@ -6,6 +6,7 @@ from pathlib import Path
 
 import cmsis_svd
 import pytest
+from cmsis_svd.model import SVDDevice
 from cmsis_svd.parser import SVDParser
 from lxml import etree
 
@@ -65,6 +66,12 @@ TABLES = [device.processor() for device in devices() if device.processor is not 
 EACH = pytest.mark.parametrize("tables", TABLES, ids=lambda tables: tables.name)
 
 
+@pytest.fixture
+def device(tables, tmp_path: Path) -> SVDDevice:
+    (tmp_path / "part.svd").write_text(svd(tables))
+    return SVDParser.for_xml_file(str(tmp_path / "part.svd")).get_device()
+
+
 @EACH
 def test_svd_is_valid(tables) -> None:
     folder = Path(cmsis_svd.__file__).parent / "schemas"
@@ -74,10 +81,7 @@ def test_svd_is_valid(tables) -> None:
 
 
 @EACH
-def test_parser_finds_every_register(tables, tmp_path: Path) -> None:
-    path = tmp_path / "part.svd"
-    path.write_text(svd(tables))
-    device = SVDParser.for_xml_file(str(path)).get_device()
+def test_parser_finds_every_register(tables, device) -> None:
     found = {
         (peripheral.name, register.name): (
             peripheral.base_address + register.address_offset,
@@ -108,10 +112,7 @@ def test_parser_finds_every_register(tables, tmp_path: Path) -> None:
 
 
 @EACH
-def test_parser_finds_part_and_access_rights(tables, tmp_path: Path) -> None:
-    path = tmp_path / "part.svd"
-    path.write_text(svd(tables))
-    device = SVDParser.for_xml_file(str(path)).get_device()
+def test_parser_finds_part_and_access_rights(tables, device) -> None:
     assert device.name == tables.name
     assert (device.address_unit_bits, device.width, device.size) == (8, 32, 32)
     layouts = {one.name: layout for layout in tables.layouts for one in layout.instances}

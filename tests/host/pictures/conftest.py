@@ -1,13 +1,29 @@
+from pathlib import Path
+
+import numpy as np
 import pytest
-from PIL import ImageDraw
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw
 
 from cubestack.host.pictures.labels import Box
+from cubestack.host.pictures.sheet import Colour
 
 
 class Text(str):
     """A drawn text, with the box of its ink."""
 
     box: Box
+
+
+def opened(path: Path) -> NDArray[np.uint8]:
+    with Image.open(path) as image:
+        return np.asarray(image)
+
+
+def drawn(image: object, colour: Colour, rows: int | None = None) -> NDArray[np.float64]:
+    """Columns and rows (n, 2) of pixels in a colour, in all rows or the first ones."""
+    y, x = np.nonzero(np.all(np.asarray(image)[:rows] == colour, axis=2))
+    return np.stack([x, y], axis=1).astype(float)
 
 
 @pytest.fixture

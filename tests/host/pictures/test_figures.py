@@ -1,7 +1,7 @@
 from collections.abc import Sequence
-from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -194,21 +194,14 @@ def test_effects_are_shaded_from_white_to_black(shown: int, figures: list[Any]) 
     assert len(greys) == 1 or greys[-1] == 0.0
 
 
-@dataclass(frozen=True)
-class Counts:
-    strength: float
-    right: int
-    refused: int
-    wrong: int
-
-    @property
-    def pictures(self) -> int:
-        return self.right + self.refused + self.wrong
+def counts(strength: float, right: int, refused: int, wrong: int) -> Any:
+    outcomes = {"right": right, "refused": refused, "wrong": wrong}
+    return SimpleNamespace(strength=strength, pictures=sum(outcomes.values()), **outcomes)
 
 
 CURVES = {
-    "CubeStar": [Counts(0, 20, 0, 0), Counts(7.5, 5, 10, 5)],
-    "AraMiS": [Counts(0, 9, 0, 1), Counts(7.5, 0, 9, 1)],
+    "CubeStar": [counts(0, 20, 0, 0), counts(7.5, 5, 10, 5)],
+    "AraMiS": [counts(0, 9, 0, 1), counts(7.5, 0, 9, 1)],
 }
 
 

@@ -1,17 +1,31 @@
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
+from PIL import Image
 
+from cubestack.emulator.camera.ov7620.fisheye import LENSES
 from cubestack.emulator.scene.attitude import quaternion_from_pointing
+from cubestack.emulator.scene.earth_sun import CameraTarget
+from cubestack.firmware_model.interface.cubesense import codes
 from cubestack.host.calibration.camera import Camera
+from cubestack.host.clients.cubesense.client import direction
 from cubestack.host.emulation.emulated import open_device
-from cubestack.host.experiments.cubesense.pictures import overlay
+from cubestack.host.experiments.cubesense.pictures import (
+    _inset,
+    annotate_nadir,
+    annotate_sun,
+    overlay,
+    pixel,
+)
+from cubestack.host.experiments.measure import measure
 from cubestack.host.experiments.scene_truth import true_stars
 from cubestack.host.pictures.images import IDENTIFIED, SKY, UNKNOWN, TrueStar, star_sheet, stretched
 from cubestack.host.pictures.overlay import star_overlay
 from cubestack.host.pictures.sheet import GRID, TRUTH
+
+from .conftest import drawn, opened
 
 SHAPE = (256, 512)
 CAMERA = Camera(f_px=600, cx_px=255.5, cy_px=127.5)
@@ -24,18 +38,15 @@ class Found:
     hipparcos: int | None
 
 
-def marked(sheet: object, colour: tuple[int, int, int]) -> NDArray[np.bool_]:
-    return np.all(np.asarray(sheet)[: SHAPE[0]] == colour, axis=2)
-
-
 def test_found_identified_and_true_stars_have_different_marks() -> None:
     picture = np.zeros(SHAPE, np.uint8)
     stars = [Found(100, 80, 32349), Found(300, 200, None)]
     sheet = star_sheet(picture, stars, "sky", (), CAMERA.directions, [TrueStar(1, 400, 50)])
     for colour, (x, y) in ((IDENTIFIED, (100, 80)), (UNKNOWN, (300, 200)), (TRUTH, (400, 50))):
-        rows, columns = np.nonzero(marked(sheet, colour)[y - 20 : y + 20, x - 20 : x + 20])
-        assert np.hypot(columns.mean() - 20, rows.mean() - 20) < 2
-    assert marked(sheet, GRID).sum() > 200
+        away = drawn(sheet, colour, SHAPE[0]) - (x, y)
+        near = away[np.abs(away).max(axis=1) < 20]
+        assert np.hypot(*near.mean(axis=0)) < 2
+    assert len(drawn(sheet, GRID, SHAPE[0])) > 200
     assert sheet.size[1] > SHAPE[0]
 
 
@@ -83,3 +94,42 @@ def test_overlay_names_identified_stars() -> None:
         marks = star_overlay(emulated.client, "SRAM").marks
     assert {one.name: one.hipparcos for one in marks}["Rigel"] == 24436
     assert all((one.hipparcos is None) == (one.name == "") for one in marks)
+
+
+@pytest.mark.parametrize("camera", codes.Camera)
+def test_pixel_matches_the_lens_of_the_camera(camera: codes.Camera) -> None:
+    rng = np.random.default_rng(3)
+    angles = rng.uniform(-60, 60, (50, 2))
+    vectors = np.array([direction(*pair) for pair in angles])
+    seen = np.array([LENSES[CameraTarget[camera.name]].project(vector) for vector in vectors])
+    np.testing.assert_allclose(pixel(camera, vectors), seen, atol=0.01)
+
+
+@pytest.mark.parametrize("at", [(100, 100), (500, 100), (100, 400), (500, 400)])
+def test_enlarged_window_reports_its_whole_box(at: tuple[int, int]) -> None:
+    image = Image.new("RGB", (1280, 960))
+    box = _inset(image, np.full((480, 640), 255, np.uint8), at, np.array(at, float), None)
+    assert (box.left, box.top, box.right, box.bottom) == image.getbbox()
+
+
+@pytest.mark.parametrize("camera", codes.Camera)
+def test_brightness_is_drawn_linearly(tmp_path: Path, camera: codes.Camera) -> None:
+    picture = np.zeros((480, 640), np.uint8)
+    picture[300:340, 200:240], picture[300:340, 300:340] = 100, 200
+    if camera is codes.Camera.NADIR:
+        annotate_nadir(picture, np.zeros((0, 2)), None, tmp_path / "drawn.png")
+    else:
+        annotate_sun(picture, (0x3FF, 0x1FF), None, tmp_path / "drawn.png")
+    rows = opened(tmp_path / "drawn.png")[600:680]
+    levels = [np.median(rows[:, 2 * left : 2 * left + 80]) for left in (100, 200, 300)]
+    assert levels == pytest.approx([0, 127.5, 255], abs=1)
+
+
+@pytest.mark.parametrize(
+    ("sensor", "told", "other"), [("sun", "sun_pixels", "edges"), ("nadir", "edges", "sun_pixels")]
+)
+def test_each_sensor_has_its_own_column(sensor: str, told: str, other: str) -> None:
+    (result,) = measure("cubesense", frames=1, sensor=sensor)
+    assert result.sensor == sensor
+    assert getattr(result, told) > 0
+    assert getattr(result, other) is None

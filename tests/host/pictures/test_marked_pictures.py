@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from PIL import Image
+from scipy.spatial.transform import Rotation
 
 from cubestack.emulator.scene.hipparcos import load_sky
 from cubestack.firmware_model.interface.cubesense.codes import Camera
@@ -33,21 +34,10 @@ from cubestack.host.pictures.images import (
 )
 from cubestack.host.pictures.overlay import _NAMES, star_name
 from cubestack.host.pictures.sheet import GRID, TRUTH, Colour
-from tests.host.pictures.conftest import Text
+from tests.host.pictures.conftest import Text, drawn, opened
 from tests.host.pictures.test_images import CAMERA, SHAPE, Found
 
 SENSE = np.full((480, 640), 34, np.uint8)
-
-
-def ink(image: object, colour: Colour, rows: int) -> NDArray[np.float64]:
-    """Columns and rows (n, 2) of pixels in a colour, in the picture itself."""
-    y, x = np.nonzero(np.all(np.asarray(image)[:rows] == colour, axis=2))
-    return np.stack([x, y], axis=1).astype(float)
-
-
-def opened(path: Path) -> NDArray[np.uint8]:
-    with Image.open(path) as image:
-        return np.asarray(image)
 
 
 def test_save_picture_keeps_grey_values(tmp_path: Path) -> None:
@@ -74,7 +64,7 @@ def test_legend_explains_the_drawn_marks(known: int, unknown: int, written: list
         (IDENTIFIED, known, "identified by the device"),
         (UNKNOWN, unknown, "found, not identified"),
     ):
-        assert bool(len(ink(image, colour, SHAPE[0]))) == (text in written) == (number > 0)
+        assert bool(len(drawn(image, colour, SHAPE[0]))) == (text in written) == (number > 0)
     assert f"{known + unknown} stars found, {known} of them identified" in written
     assert ("Sirius" in written) == (known > 0)
     assert not any("boresight" in text or "true" in text for text in written)
@@ -109,7 +99,7 @@ def test_truth_marks_are_wider_than_found_marks() -> None:
     image = star_sheet(
         np.zeros(SHAPE, np.uint8), [Found(100, 80, 1)], "", (), None, [TrueStar(1, 100, 80)]
     )
-    circle, ticks = ink(image, IDENTIFIED, SHAPE[0]), ink(image, TRUTH, SHAPE[0])
+    circle, ticks = drawn(image, IDENTIFIED, SHAPE[0]), drawn(image, TRUTH, SHAPE[0])
     assert np.abs(circle - (100, 80)).max() < np.abs(ticks - (100, 80)).max() < 16
     assert np.abs(ticks - (100, 80)).max(axis=1).min() > 4
 
@@ -134,7 +124,6 @@ def test_star_has_its_name_or_its_number() -> None:
 
 
 def test_names_belong_to_bright_stars() -> None:
-
     assert set(_NAMES) <= set(load_sky(mag_limit=3.0).hip.tolist())
     assert len(set(_NAMES.values())) == len(_NAMES)
 
@@ -171,7 +160,7 @@ def test_residual_arrow_starts_at_its_place_and_is_magnified(
     assert f"magnified {scale} times" in written[0]
     image = opened(tmp_path / "residuals.png")
     assert image.shape[:2] == (200 + 80, 300 + 80)
-    arrows = ink(image, ARROW, image.shape[0])
+    arrows = drawn(image, ARROW, image.shape[0])
     for place, sign in zip(places + 40, (1, -1), strict=True):
         own = arrows[np.hypot(*(arrows - place).T) < 60] - place
         length = float(scale) * size
@@ -186,7 +175,7 @@ def test_residual_arrow_starts_at_its_place_and_is_magnified(
 def test_residuals_are_framed(tmp_path: Path) -> None:
     save_residuals(np.array([[0.0, 0], [99.2, 49.5]]), np.zeros((2, 2)), tmp_path / "r.png")
     image = opened(tmp_path / "r.png")
-    frame = ink(image, (190, 190, 190), image.shape[0])
+    frame = drawn(image, (190, 190, 190), image.shape[0])
     assert [*frame.min(axis=0), *frame.max(axis=0)] == [40, 40, 140, 90]
     assert image.shape[:2] == (130, 180)
 
@@ -196,7 +185,7 @@ def test_residuals_are_framed(tmp_path: Path) -> None:
 
 def middle(image: NDArray[np.uint8], colour: Colour) -> tuple[float, float]:
     """Centre of all pixels of a colour, in px of the camera."""
-    places = ink(image, colour, 960)
+    places = drawn(image, colour, 960)
     x, y = (places.min(axis=0) + places.max(axis=0)) / 4 - 0.25
     return float(x), float(y)
 
@@ -212,19 +201,19 @@ def test_nadir_is_marked_and_captioned(tmp_path: Path, written: list[Text]) -> N
     text = " ".join(written)
     assert "Earth 1 edges found; centre at alpha +10.00°, beta -5.00° (this program" in text
     assert "truth alpha -20.00°, beta +15.00°" in text
-    assert {"edge found on a scanned line", "centre found", "truth (unknown to the device)"} <= {
-        *written
-    }
+    legend = {"edge found on a scanned line", "centre found", "truth (unknown to the device)"}
+    assert legend <= {*written}
     assert "limb fitted" not in written
-    assert len(ink(image, FITTED, 960)) < 150
-    sizes = [np.ptp(ink(image, colour, 960), axis=0).max() / 2 for colour in (EDGE, FITTED, TRUTH)]
+    assert len(drawn(image, FITTED, 960)) < 150
+    marks = (drawn(image, colour, 960) for colour in (EDGE, FITTED, TRUTH))
+    sizes = [np.ptp(places, axis=0).max() / 2 for places in marks]
     assert sizes == sorted(sizes)
     assert 3 < sizes[0] < sizes[2] < 40
 
 
 def test_limb_is_drawn_and_captioned(tmp_path: Path, written: list[Text]) -> None:
     annotate_nadir(SENSE, np.zeros((0, 2)), (4.0, -3.0, 50.0), tmp_path / "n.png")
-    green = ink(opened(tmp_path / "n.png"), FITTED, 960)
+    green = drawn(opened(tmp_path / "n.png"), FITTED, 960)
     rim = 2 * (limb(4.0, -3.0, 50.0) + 0.5)
     apart = np.hypot(*(green[:, None] - rim).transpose(2, 0, 1))
     centre = 2 * (pixel(Camera.NADIR, direction(4.0, -3.0)[None])[0] + 0.5)
@@ -239,15 +228,11 @@ def test_limb_is_drawn_and_captioned(tmp_path: Path, written: list[Text]) -> Non
 def test_limb_points_have_the_same_angle_from_the_axis() -> None:
     for alpha, beta in ((0.0, 0.0), (30.0, 5.0), (3.0, -25.0)):
         rim = limb(alpha, beta, 20.0)
-        around = np.radians(np.arange(0, 360, 7))
-        vectors = []
         axis = direction(alpha, beta)
-        one = np.cross(axis, (0.6, 0.8, 0.1))
-        one /= np.linalg.norm(one)
-        for angle in around:
-            side = np.cos(angle) * one + np.sin(angle) * np.cross(axis, one)
-            vectors.append(np.cos(np.radians(20)) * axis + np.sin(np.radians(20)) * side)
-        expected = pixel(Camera.NADIR, np.array(vectors))
+        side = np.cross(axis, (0.6, 0.8, 0.1))
+        tilt = Rotation.from_rotvec(20 * side / np.linalg.norm(side), degrees=True)
+        turns = Rotation.from_rotvec(np.outer(np.arange(0, 360, 7), axis), degrees=True)
+        expected = pixel(Camera.NADIR, (turns * tilt).apply(axis))
         apart = np.linalg.norm(expected[:, None] - rim, axis=2)
         assert apart.min(axis=1).max() < 3
         assert len(np.unique(rim.round(6), axis=0)) == len(rim) >= 90
@@ -275,7 +260,7 @@ def test_sun_window_is_enlarged_in_the_farthest_corner(
     assert np.linalg.norm(boresight - first) > 100
     annotate_sun(picture, first, (0.0, 0.0), tmp_path / "s.png", "Sun", (1.0, 2.0))
     image = opened(tmp_path / "s.png")
-    edge = ink(image, EDGE, 960)
+    edge = drawn(image, EDGE, 960)
     near = edge[np.abs(edge / 2 - origin - side / 2).max(axis=1) < side]
     corners = [*(2 * origin), *(2 * (origin + side))]
     assert [*near.min(axis=0), *near.max(axis=0)] == pytest.approx(corners, abs=2)
@@ -285,7 +270,7 @@ def test_sun_window_is_enlarged_in_the_farthest_corner(
     left, top = far.min(axis=0)
     assert (left > 640) == (first[0] < 320)
     assert (top > 480) == (first[1] < 240)
-    white = ink(image, (255, 255, 255), 960)
+    white = drawn(image, (255, 255, 255), 960)
     white = white[np.abs(white / 2 - origin - side / 2).max(axis=1) >= side]
     assert np.ptp(white, axis=0) == pytest.approx([15, 15], abs=1)
     assert white.min(axis=0) - (left, top) == pytest.approx([16 * 5, 16 * 3], abs=2)
@@ -306,11 +291,11 @@ def test_enlarged_window_marks_found_and_true_sun(tmp_path: Path) -> None:
     annotate_sun(SENSE, first, angles, tmp_path / "s.png", "Sun", truth)
     image = opened(tmp_path / "s.png")
     for colour, place in ((FITTED, found), (TRUTH, true)):
-        marks = ink(image, colour, 960)
+        marks = drawn(image, colour, 960)
         far = np.abs(marks / 2 - found).max(axis=1) > 60
         near = (marks[~far].min(axis=0) + marks[~far].max(axis=0)) / 4 - 0.25
         assert near == pytest.approx(place, abs=1)
-        edge = ink(image, EDGE, 960)
+        edge = drawn(image, EDGE, 960)
         corner = edge[np.abs(edge / 2 - found).max(axis=1) > 60].min(axis=0)
         offset = place - (np.array(FULL_SIZE.window_origin(*first)) - 0.5)
         centre = (marks[far].min(axis=0) + marks[far].max(axis=0)) / 2
@@ -323,7 +308,7 @@ def test_window_at_the_border_is_enlarged(first: tuple[int, int], tmp_path: Path
     picture = SENSE.copy()
     picture[first[1], first[0]] = 255
     annotate_sun(picture, first, (0.0, 0.0), tmp_path / "s.png")
-    white = ink(opened(tmp_path / "s.png"), (255, 255, 255), 960)
+    white = drawn(opened(tmp_path / "s.png"), (255, 255, 255), 960)
     far = np.abs(white / 2 - first).max(axis=1) > 30
     assert 100 < far.sum() <= 256
 
@@ -331,7 +316,7 @@ def test_window_at_the_border_is_enlarged(first: tuple[int, int], tmp_path: Path
 def test_missing_sun_is_captioned(tmp_path: Path, written: list[Text]) -> None:
     annotate_sun(SENSE, (0x3FF, 0x1FF), None, tmp_path / "s.png")
     image = opened(tmp_path / "s.png")
-    assert not any(len(ink(image, colour, 960)) for colour in (EDGE, FITTED, TRUTH))
+    assert not any(len(drawn(image, colour, 960)) for colour in (EDGE, FITTED, TRUTH))
     assert "no Sun found" in written
     assert "sun camera" in written
     assert "centroid found" not in written

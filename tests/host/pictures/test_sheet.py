@@ -8,9 +8,9 @@ from PIL import Image, ImageFont
 
 from cubestack.host.calibration.camera import Camera
 from cubestack.host.pictures.labels import Box
-from cubestack.host.pictures.sheet import GRID, PAPER, PLATE, TEXT, Colour, Entry, Shape, Sheet
+from cubestack.host.pictures.sheet import GRID, PAPER, PLATE, TEXT, Entry, Shape, Sheet
 
-from .conftest import Text
+from .conftest import Text, drawn
 
 ROWS, COLUMNS = 400, 800
 LENS = Camera(f_px=700, cx_px=390.0, cy_px=210.0)
@@ -21,12 +21,6 @@ SHAPES: list[Shape] = ["circle", "square", "cross", "line", "ticks"]
 
 def black(scale: int = 1) -> Sheet:
     return Sheet(np.zeros((ROWS // scale, COLUMNS // scale), np.uint8), scale)
-
-
-def drawn(image: object, colour: Colour) -> NDArray[np.float64]:
-    """Columns and rows (n, 2) of pixels in a colour."""
-    rows, columns = np.nonzero(np.all(np.asarray(image) == colour, axis=2))
-    return np.stack([columns, rows], axis=1).astype(float)
 
 
 def edges(places: NDArray[np.float64]) -> list[float]:

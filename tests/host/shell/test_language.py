@@ -1,5 +1,4 @@
 import contextlib
-from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -14,37 +13,18 @@ from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.clients.registers import RegisterClient
 from cubestack.host.devices.registry import device
-from cubestack.host.emulation.controls import EmulatedControls
 from cubestack.host.errors import CommandRefusedError, NoAnswerError, TargetError
 from cubestack.host.shell.language import Shell, ShellError
 from cubestack.host.shell.registers import parse_value, parse_values
 from cubestack.host.targets import Target
 
-from ..conftest import LetterLine, Slave, UartLink
-
-#: What controls of an emulated device have and answer.
-CONTROLS = {
-    "faults": ("latch-up SRAM1", "latch-up SRAM2", "camera sun"),
-    "fault_parameters": {"latch-up": ("extra_ma", "at_s"), "camera": ("for_s",)},
-    "channels": ("SRAM1", "SRAM2"),
-    "fault_log.return_value": ["0.1 s latch-up SRAM1"],
-    "currents.return_value": {"total": 71.94},
-    "time_s.return_value": 1.5,
-}
+from ..conftest import LetterLine, Slave
 
 
 @pytest.fixture
 def shell(node, uart) -> Shell:
     client = NodeClient(uart, CUBESTAR)
     return Shell(Target("fake", CUBESTAR, client, uart, device=device("cubestar")))
-
-
-@pytest.fixture
-def sense_shell(sense) -> Shell:
-    registers = RegisterClient(Slave(), CUBESENSE.registers, wait=lambda _s: None)
-    line, letters = UartLink(sense), LetterLine(q=b"Y", s=bytes(100))
-    node, controls = NodeClient(line, CUBESENSE), Mock(EmulatedControls, **CONTROLS)
-    return Shell(Target("fake", CUBESENSE, node, line, registers, letters, controls))
 
 
 def test_every_telemetry_is_read(shell):

@@ -1,50 +1,13 @@
 from pathlib import Path
 from typing import Any
-from unittest.mock import Mock
 
 import pytest
 
 from cubestack.firmware_model.interface.cubesense import INTERFACE
-from cubestack.host.clients.node import NodeClient
-from cubestack.host.emulation.controls import EmulatedControls
-from cubestack.host.shell.language import Shell, ShellError
-from cubestack.host.shell.names import CommandResult, check_count, to_number
-from cubestack.host.targets import Target
+from cubestack.host.shell.language import ShellError
+from cubestack.host.shell.names import check_count, to_number
 
-from ..conftest import LetterLine, UartLink
-
-CONTROLS = {
-    "faults": ("latch-up SRAM1",),
-    "fault_parameters": {},
-    "channels": ("SRAM1",),
-    "fault_log.return_value": ["0.1 s latch-up SRAM1"],
-    "currents.return_value": {"total": 71.94, "SRAM1": 0.25},
-    "time_s.return_value": 1.5,
-    "peek.return_value": {"TIMER0.CNT": (7, "0x7"), "x": (None, "not there")},
-}
-
-
-class Known:
-    def __init__(self, sense: Any) -> None:
-        self.line = UartLink(sense)
-        self.letters = LetterLine(q=b"Y", a=b"12345678", b=b"123456789")
-        self.controls = Mock(EmulatedControls, **CONTROLS)
-        self.target = Target(
-            *("fake", INTERFACE, NodeClient(self.line, INTERFACE), self.line),
-            service_port=self.letters,
-            controls=self.controls,
-        )
-        self.shell = Shell(self.target)
-
-    def run(self, line: str) -> CommandResult:
-        result = self.shell.execute(line)
-        assert result is not None
-        return result
-
-
-@pytest.fixture
-def known(sense: Any) -> Known:
-    return Known(sense)
+from .conftest import CONTROLS, Known
 
 
 @pytest.mark.parametrize(
@@ -92,7 +55,8 @@ def test_scene_and_faults(known: Known) -> None:
     assert known.run("scene a.toml").data == {"scene": "a.toml"}
     known.controls.scene.assert_called_once_with(Path("a.toml"))
     listed = known.run("fault")
-    assert (listed.rows, listed.data) == ([("", "latch-up SRAM1")], {"faults": ("latch-up SRAM1",)})
+    faults = CONTROLS["faults"]
+    assert (listed.rows, listed.data) == ([("", one) for one in faults], {"faults": faults})
     log = known.run("fault log")
     assert log.rows == [("", "0.1 s latch-up SRAM1")]
     known.controls.fault.assert_not_called()
@@ -122,7 +86,6 @@ def test_raw_waits_briefly_for_more_bytes(known: Known) -> None:
 
 
 def test_bench_shows_short_answers_and_counts_long_ones(known: Known) -> None:
-    assert INTERFACE.service_port is not None
     for letter in INTERFACE.service_port.letters:
         known.letters.answers[letter.letter] = b"x" * letter.length
         found = known.run(f"bench {letter.letter}")

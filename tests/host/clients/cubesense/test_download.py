@@ -1,3 +1,4 @@
+from functools import partial
 from itertools import count
 from typing import Any
 
@@ -16,6 +17,12 @@ from ...conftest import LetterLine
 @pytest.fixture
 def client(uart: Any) -> NodeClient:
     return NodeClient(uart, INTERFACE)
+
+
+@pytest.fixture
+def download(client: NodeClient) -> Any:
+    """Downloads the smallest size from SRAM1."""
+    return partial(download_image, client, Sram.SRAM1, ImageSize.SIDE_64)
 
 
 @pytest.fixture(autouse=True)
@@ -39,55 +46,49 @@ def test_every_size_returns_its_subsampled_pixels(
     assert len(node.log) == size.frames
 
 
-def test_a_frame_is_polled_every_40_ms_for_at_most_2_s(
-    client: NodeClient, node: Any, uart: Any
-) -> None:
+def test_a_frame_is_polled_every_40_ms_for_at_most_2_s(download: Any, node: Any, uart: Any) -> None:
     node.preparing = 3
-    download_image(client, Sram.SRAM1, ImageSize.SIDE_64)
+    download()
     assert uart.silences.count(0.04) == 3 * 32
     uart.silences.clear()
     node.preparing = 49
-    download_image(client, Sram.SRAM1, ImageSize.SIDE_64)
+    download()
     uart.silences.clear()
     node.preparing = 50
     with pytest.raises(NoAnswerError, match="image frame 0 not ready within 2 s"):
-        download_image(client, Sram.SRAM1, ImageSize.SIDE_64)
+        download()
     assert uart.silences.count(0.04) == 50
 
 
-def test_a_damaged_frame_is_read_again(client: NodeClient, node: Any) -> None:
+def test_a_damaged_frame_is_read_again(download: Any, node: Any) -> None:
     node.damaged = 2
-    square = download_image(client, Sram.SRAM1, ImageSize.SIDE_64)
+    square = download()
     np.testing.assert_array_equal(picture_of(square), node.pictures[0, ::16, ::16])
     node.damaged = 3
     with pytest.raises(BadAnswerError, match=r"image frame 0: checksum 0x40, not 0x00, in 3 reads"):
-        download_image(client, Sram.SRAM1, ImageSize.SIDE_64)
+        download()
 
 
-def test_lost_acknowledge_requests_the_frame_again(
-    client: NodeClient, node: Any, uart: Any
-) -> None:
+def test_lost_acknowledge_requests_the_frame_again(download: Any, node: Any, uart: Any) -> None:
     requests = count()  # the first two of the second frame are lost
     uart.mangle = lambda data: b"" if next(requests) in (3, 4) else data
-    square = download_image(client, Sram.SRAM1, ImageSize.SIDE_64)
+    square = download()
     np.testing.assert_array_equal(picture_of(square), node.pictures[0, ::16, ::16])
     assert [values.get("Frame", 0) for _, values in node.log] == [0, 1, 1, *range(1, 32)]
 
 
-def test_reports_missing_acknowledges_after_3_attempts(
-    client: NodeClient, node: Any, uart: Any
-) -> None:
+def test_reports_missing_acknowledges_after_3_attempts(download: Any, node: Any, uart: Any) -> None:
     requests = count()
     uart.mangle = lambda data: data if next(requests) < 3 else b""
     with pytest.raises(NoAnswerError, match="no acknowledge of telecommand NextImageFrame"):
-        download_image(client, Sram.SRAM1, ImageSize.SIDE_64)
+        download()
     assert [name for name, _ in node.log].count("NextImageFrame") == 3
 
 
-def test_refused_download_is_not_retried(client: NodeClient, node: Any) -> None:
+def test_refused_download_is_not_retried(download: Any, node: Any) -> None:
     node.refusals.append(4)
     with pytest.raises(CommandRefusedError, match="StartImageDownload refused: BUFFER_FULL"):
-        download_image(client, Sram.SRAM1, ImageSize.SIDE_64)
+        download()
 
 
 def test_picture_of_rejects_other_shapes() -> None:

@@ -80,6 +80,9 @@ def test_paths_are_relative_to_the_plan(tmp_path: Path) -> None:
     assert block.options == {"scene": str(tmp_path / "x.toml")}
 
 
+HEAD = 'device = "cubestar"\nframes = 1\n'
+
+
 @pytest.mark.parametrize(
     ("text", "error"),
     [
@@ -88,19 +91,13 @@ def test_paths_are_relative_to_the_plan(tmp_path: Path) -> None:
         ('device = "nobody"\nframes = 1', "no device 'nobody'; known: cubestar"),
         ('device = "cubestar"\nframes = 0', "frames must be at least 1, not 0"),
         ('device = "cubestar"\nframe = 1', "no key 'frame' here; known: device, frames"),
-        ('device = "cubestar"\nframes = 1\n[grid]\nfalse_star = [1]', "no option 'false_star'"),
-        ('device = "cubestar"\nframes = 1\n[grid]\nfalse_stars = [1, -2]', "false_stars = -2"),
-        ('device = "cubestar"\nframes = 1\n[grid]\nfalse_stars = 3', "must be a list of values"),
-        ('device = "cubestar"\nframes = 1\n[grid]\nseed = [1]', "seed belongs at the top"),
-        ('device = "cubestar"\nframes = 1\n[random]\nmag_limit = 3', "random.mag_limit must be"),
-        (
-            'device = "cubestar"\nframes = 1\n[random]\nmag_limit = { low = 6, high = 3 }',
-            "random.mag_limit must be",
-        ),
-        (
-            'device = "cubestar"\nframes = 1\n[options]\nmode = "lis"\n[grid]\nmode = ["lis"]',
-            "mode is given in two",
-        ),
+        (HEAD + "[grid]\nfalse_star = [1]", "no option 'false_star'"),
+        (HEAD + "[grid]\nfalse_stars = [1, -2]", "false_stars = -2"),
+        (HEAD + "[grid]\nfalse_stars = 3", "must be a list of values"),
+        (HEAD + "[grid]\nseed = [1]", "seed belongs at the top"),
+        (HEAD + "[random]\nmag_limit = 3", "random.mag_limit must be"),
+        (HEAD + "[random]\nmag_limit = { low = 6, high = 3 }", "random.mag_limit must be"),
+        (HEAD + '[options]\nmode = "lis"\n[grid]\nmode = ["lis"]', "mode is given in two"),
         ("device = ", "Invalid value"),
     ],
 )

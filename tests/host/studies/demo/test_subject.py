@@ -1,6 +1,6 @@
 import re
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import fields, replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -24,6 +24,7 @@ from cubestack.host.studies.demo import Demo, download
 from cubestack.host.targets import Target, open_target
 
 from ....conftest import Run
+from ...pictures.conftest import opened
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
 
@@ -54,11 +55,6 @@ def _here(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Demo, "client", client)
     for module in (cubestar, cubesense):
         monkeypatch.setattr(module, "download", rendered)
-
-
-def opened(path: Path) -> NDArray[np.uint8]:
-    with Image.open(path) as image:
-        return np.asarray(image)
 
 
 def errors_told(text: str) -> list[float]:
@@ -210,17 +206,13 @@ def said(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 def emulator(*lines: str, port: Path) -> Callable[[object], object]:
     """An emulator that prints ``lines``; its port exists from `SERVES` on."""
 
-    @contextmanager
-    def emulating(_words: object) -> Iterator[Iterator[str]]:
-        def talk() -> Iterator[str]:
-            for line in lines:
-                if line == SERVES:
-                    port.touch()
-                yield line
+    def talk() -> Iterator[str]:
+        for line in lines:
+            if line == SERVES:
+                port.touch()
+            yield line
 
-        yield talk()
-
-    return emulating
+    return lambda _words: nullcontext(talk())
 
 
 def test_output_of_the_emulator_is_shown_in_full(

@@ -37,6 +37,12 @@ CLEAN = Snapshot(
 )
 
 
+RIGHT = UpsetResult(
+    *("writer$3.row", 0, False, "storing", 1.0, "nothing", "right", "", 0),
+    *({"idle": 0.75, "storing": 0.25}, 1.0, 9, 2.0),
+)
+
+
 def changed(*places: int) -> Snapshot:
     data = CLEAN.data.copy()
     data[list(places)] ^= 1
@@ -72,9 +78,7 @@ def test_effect_is_the_most_severe(found: Snapshot, effect: Effect) -> None:
 def test_wrong_answer_is_solved_and_refusal_is_not(
     answer: Answer, right: bool, solved: bool
 ) -> None:
-    one = UpsetResult(
-        *("row", 0, False, "idle", 1.0, "nothing", answer, "", 0), *({"idle": 1.0}, 1.0, 9, 2.0)
-    )
+    one = replace(RIGHT, answer=answer)
     assert (one.right, one.solved) == (right, solved)
 
 
@@ -242,10 +246,6 @@ def test_hanging_copy_times_out() -> None:
         in_copy(lambda: time.sleep(600), limit_s=0.1)
 
 
-RIGHT = UpsetResult(
-    *("writer$3.row", 0, False, "storing", 1.0, "nothing", "right", "", 0),
-    *({"idle": 0.75, "storing": 0.25}, 1.0, 9, 2.0),
-)
 PICTURE = replace(RIGHT, effect="picture", bit=1)
 WRONG = replace(PICTURE, answer="wrong", recovered=1)
 IDLE = replace(RIGHT, phase="idle")
