@@ -2,7 +2,6 @@ import queue
 import sys
 import threading
 import time
-from collections.abc import Iterator
 from types import ModuleType
 from typing import Any
 
@@ -51,27 +50,22 @@ clocks = [t.time, t.monotonic, t.perf_counter]
 
 
 @pytest.fixture
-def driver(request: pytest.FixtureRequest) -> Iterator[Any]:
+def driver(monkeypatch: pytest.MonkeyPatch) -> Any:
     """A module that imported names from ``time`` before the device was opened."""
     module = ModuleType("driver_under_test")
     exec(DRIVER, module.__dict__)
-    sys.modules[module.__name__] = module
-    yield module
-    del sys.modules[module.__name__]
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    return module
 
 
 @pytest.fixture
-def clock() -> VirtualClock:
+def clock() -> Any:
     return VirtualClock()
 
 
-def followed(clock: VirtualClock, device: FakeDevice) -> Any:
-    return clock.follow(device)  # type: ignore[arg-type]
-
-
-def test_poll_loop_of_an_hour_takes_virtual_time(clock: VirtualClock, driver: Any) -> None:
+def test_poll_loop_of_an_hour_takes_virtual_time(clock: Any, driver: Any) -> None:
     device, began_s = FakeDevice(5.0), time.monotonic()
-    with followed(clock, device):
+    with clock.follow(device):
         assert not driver.poll(lambda: False)
         assert device.time_s == pytest.approx(3605, abs=0.2)
         assert driver.poll(lambda: device.time_s > 3700)
@@ -79,16 +73,16 @@ def test_poll_loop_of_an_hour_takes_virtual_time(clock: VirtualClock, driver: An
     assert time.monotonic() - began_s < 60
 
 
-def test_busy_loop_ends(clock: VirtualClock, driver: Any) -> None:
+def test_busy_loop_ends(clock: Any, driver: Any) -> None:
     device = FakeDevice()
-    with followed(clock, device):
+    with clock.follow(device):
         looks = driver.spin(0.1)
     assert looks == pytest.approx(0.1 * NS_PER_S / LOOK_NS, abs=2)
     assert device.time_s == pytest.approx(0.1, abs=3e-5)
 
 
-def test_all_clocks_show_virtual_time(clock: VirtualClock) -> None:
-    with followed(clock, FakeDevice(7.0)):
+def test_all_clocks_show_virtual_time(clock: Any) -> None:
+    with clock.follow(FakeDevice(7.0)):
         began = [getattr(time, name)() for name in CLOCKS]
         assert began == pytest.approx([real() / NS_PER_S for real in CLOCKS.values()], abs=5)
         time.sleep(1000)
@@ -99,9 +93,9 @@ def test_all_clocks_show_virtual_time(clock: VirtualClock) -> None:
         assert at_ns / NS_PER_S == pytest.approx(time.monotonic(), abs=1e-4)
 
 
-def test_clock_of_several_devices_is_monotonic(clock: VirtualClock) -> None:
+def test_clock_of_several_devices_is_monotonic(clock: Any) -> None:
     one, other = FakeDevice(100.0), FakeDevice(3.0)
-    with followed(clock, one), followed(clock, other):
+    with clock.follow(one), clock.follow(other):
         began_s = time.monotonic()
         other.wait(50)  # as an answer on its line does
         assert time.monotonic() - began_s == pytest.approx(50, abs=1e-3)
@@ -109,16 +103,16 @@ def test_clock_of_several_devices_is_monotonic(clock: VirtualClock) -> None:
         assert time.monotonic() - began_s == pytest.approx(50, abs=1e-3)
         time.sleep(1)
         assert (one.time_s, other.time_s) == pytest.approx((121, 54), abs=1e-3)
-    with followed(clock, one):
+    with clock.follow(one):
         between_s = time.monotonic()
-        with followed(clock, FakeDevice()):
+        with clock.follow(FakeDevice()):
             time.sleep(10)
         assert time.monotonic() - between_s == pytest.approx(10, abs=1e-3)
 
 
-def test_other_modules_and_threads_keep_wall_time(clock: VirtualClock, driver: Any) -> None:
+def test_other_modules_and_threads_keep_wall_time(clock: Any, driver: Any) -> None:
     device = FakeDevice()
-    with followed(clock, device):
+    with clock.follow(device):
         began_s = REAL["monotonic"]()
         for name in ("asyncio.events", "cubestack.emulator", "_pytest.runner"):
             assert name.partition(".")[0] in KEEP_WALL_TIME
@@ -134,9 +128,9 @@ def test_other_modules_and_threads_keep_wall_time(clock: VirtualClock, driver: A
         assert REAL["monotonic"]() - began_s >= 0.005
 
 
-def test_leaving_restores_the_clocks(clock: VirtualClock, driver: Any) -> None:
+def test_leaving_restores_the_clocks(clock: Any, driver: Any) -> None:
     own = dict(vars(driver))
-    with followed(clock, FakeDevice()):
+    with clock.follow(FakeDevice()):
         from time import sleep as kept
 
         assert kept is not REAL["sleep"]

@@ -75,17 +75,15 @@ def test_axis_errors_are_a_rotation_vector_at_any_angle(degrees: float) -> None:
 
 
 def test_axis_errors_of_a_half_turn() -> None:
-    assert np.linalg.norm(
-        axis_errors_deg(np.array([1.0, 0, 0, 0]), np.array([0, 0, 0, 1.0]))
-    ) == pytest.approx(180)
+    found = axis_errors_deg(np.array([1.0, 0, 0, 0]), np.array([0, 0, 0, 1.0]))
+    assert np.linalg.norm(found) == pytest.approx(180)
 
 
 def test_claims_need_truth_and_quality() -> None:
     values = dict.fromkeys(("CorrelationXY", "CorrelationXZ", "CorrelationYZ"), 0.0)
     values |= {f"Sigma{axis}": np.radians(n) for n, axis in enumerate("XYZ", 1)}
-    values |= dict.fromkeys(
-        ("Matched", "Expected", "Residual", "Background", "Noise", "Spikes"), 1.0
-    )
+    names = ("Matched", "Expected", "Residual", "Background", "Noise", "Spikes")
+    values |= dict.fromkeys(names, 1.0)
     found = common({**values, "Valid": True, "Scale": 1.0, "LogFalseAlarm": -9.0})
     rated = AttitudeQuality(reason=Reason.SOLVED, **found)
     assert rated.false_alarm == pytest.approx(1e-9)

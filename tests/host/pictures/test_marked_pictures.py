@@ -37,6 +37,7 @@ from cubestack.host.pictures.sheet import GRID, TRUTH, Colour
 from tests.host.pictures.conftest import Text, drawn, opened
 from tests.host.pictures.test_images import CAMERA, SHAPE, Found
 
+BLACK = np.zeros(SHAPE, np.uint8)
 SENSE = np.full((480, 640), 34, np.uint8)
 
 
@@ -50,7 +51,7 @@ def test_save_picture_keeps_grey_values(tmp_path: Path) -> None:
 
 
 def test_annotate_writes_the_sheet(tmp_path: Path) -> None:
-    arguments = (np.zeros(SHAPE, np.uint8), [Found(100, 80, 32349)])
+    arguments = (BLACK, [Found(100, 80, 32349)])
     annotate(*arguments, tmp_path / "sheet.png", "sky", ["a"], None, [TrueStar(1, 9, 9)])
     other = star_sheet(*arguments, "sky", ["a"], None, [TrueStar(1, 9, 9)])
     assert np.array_equal(opened(tmp_path / "sheet.png"), np.asarray(other))
@@ -59,7 +60,7 @@ def test_annotate_writes_the_sheet(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("known", "unknown"), [(0, 0), (0, 2), (2, 0), (2, 1)])
 def test_legend_explains_the_drawn_marks(known: int, unknown: int, written: list[Text]) -> None:
     stars = [Found(100, 80, 32349)] * known + [Found(300, 200, None)] * unknown
-    image = star_sheet(np.zeros(SHAPE, np.uint8), stars, "sky")
+    image = star_sheet(BLACK, stars, "sky")
     for colour, number, text in (
         (IDENTIFIED, known, "identified by the device"),
         (UNKNOWN, unknown, "found, not identified"),
@@ -69,13 +70,13 @@ def test_legend_explains_the_drawn_marks(known: int, unknown: int, written: list
     assert ("Sirius" in written) == (known > 0)
     assert not any("boresight" in text or "true" in text for text in written)
     written.clear()
-    star_sheet(np.zeros(SHAPE, np.uint8), stars, "sky", (), CAMERA.directions)
+    star_sheet(BLACK, stars, "sky", (), CAMERA.directions)
     assert "boresight, angles from it" in written
 
 
 def test_caption_counts_found_and_omitted_stars(written: list[Text]) -> None:
     stars, truth = [Found(100, 80, 32349)], [TrueStar(32349, 101, 80), TrueStar(1, 400, 50)]
-    star_sheet(np.zeros(SHAPE, np.uint8), stars, "sky", ["7 spots too small"], None, truth)
+    star_sheet(BLACK, stars, "sky", ["7 spots too small"], None, truth)
     caption = " ".join(written)
     assert "1 stars found, 1 of them identified" in caption
     assert "left out: 7 spots too small" in caption
@@ -89,16 +90,12 @@ def test_star_counts_as_found_within_3_px(
     away: float, found: int, turned: float, written: list[Text]
 ) -> None:
     truth = TrueStar(1, 100 + away * np.cos(turned), 80 + away * np.sin(turned))
-    star_sheet(
-        np.zeros(SHAPE, np.uint8), [Found(9, 9, 1), Found(100, 80, None)], "", (), None, [truth]
-    )
+    star_sheet(BLACK, [Found(9, 9, 1), Found(100, 80, None)], "", (), None, [truth])
     assert f"{found} of the 1 bright stars in the field found" in " ".join(written)
 
 
 def test_truth_marks_are_wider_than_found_marks() -> None:
-    image = star_sheet(
-        np.zeros(SHAPE, np.uint8), [Found(100, 80, 1)], "", (), None, [TrueStar(1, 100, 80)]
-    )
+    image = star_sheet(BLACK, [Found(100, 80, 1)], "", (), None, [TrueStar(1, 100, 80)])
     circle, ticks = drawn(image, IDENTIFIED, SHAPE[0]), drawn(image, TRUTH, SHAPE[0])
     assert np.abs(circle - (100, 80)).max() < np.abs(ticks - (100, 80)).max() < 16
     assert np.abs(ticks - (100, 80)).max(axis=1).min() > 4

@@ -54,12 +54,8 @@ def aramis(node: FakeAramis) -> Aramis:
 
 def test_quality(node: FakeAramis, aramis: Aramis) -> None:
     node.values["Quality"] = {
-        "Valid": 1,
-        "Reason": codes.Reason.CONFIRMED,
-        "LogFalseAlarm": -12.5,
-        "Matched": 9,
-        "Expected": 11,
-        "Residual": 0.125,
+        **{"Valid": 1, "Reason": codes.Reason.CONFIRMED, "LogFalseAlarm": -12.5},
+        **{"Matched": 9, "Expected": 11, "Residual": 0.125},
         **{"SigmaX": 1e-5, "SigmaY": 2e-5, "SigmaZ": 1e-4},
         **{"CorrelationXY": 0.25, "CorrelationXZ": -0.5, "CorrelationYZ": 0.125},
         **{"Scale": 1.0, "Background": 2.5, "Noise": 1.5, "Spread": 3.0, "Blind": 0.25},

@@ -179,13 +179,8 @@ def test_masks(cubesense: CubeSense, node: Any) -> None:
 
 
 def test_power(cubesense: CubeSense, node: Any) -> None:
-    node.values["Power"] = {
-        "Current3V3": 12.1,
-        "CurrentSram1": 7.3,
-        "CurrentSram2": 9.4,
-        "Current5V": 71.9,
-        "OverCurrent2": 1,
-    }
+    currents = {"Current3V3": 12.1, "CurrentSram1": 7.3, "CurrentSram2": 9.4, "Current5V": 71.9}
+    node.values["Power"] = currents | {"OverCurrent2": 1}
     assert cubesense.power() == Power(12.1, (7.3, 9.4), 71.9, (False, True))
     cubesense.clear_over_current(codes.SramSelection.SRAM2)
     cubesense.clear_over_current()

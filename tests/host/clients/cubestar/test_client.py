@@ -61,11 +61,8 @@ def test_attitude(cubestar: CubeStar, node: Any) -> None:
     quaternion = np.array([0.1, -0.2, 0.3, 0.927361849549570])
     node.values["AttitudeQuaternion"] = {
         **{f"Q{index}": value for index, value in enumerate(quaternion)},
-        "FrameCounter": 12,
-        "ImageTime": 34_567,
-        "Mode": MatchMode.ASSISTED,
-        "Matched": 9,
-        "Valid": True,
+        **{"FrameCounter": 12, "ImageTime": 34_567, "Matched": 9},
+        **{"Mode": MatchMode.ASSISTED, "Valid": True},
     }
     attitude = cubestar.attitude()
     np.testing.assert_allclose(attitude.quaternion, quaternion, atol=1e-7)

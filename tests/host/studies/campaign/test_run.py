@@ -28,9 +28,8 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def alone(small: Path, tmp_path_factory: pytest.TempPathFactory) -> Folder:
-    folder = Folder.begun(
-        tmp_path_factory.mktemp("c") / "alone", CampaignPlan.read(small), resume=False
-    )
+    path = tmp_path_factory.mktemp("c") / "alone"
+    folder = Folder.begun(path, CampaignPlan.read(small), resume=False)
     rows = list(run(folder, 1))
     assert len(rows) == count(folder.plan) == 4
     return folder

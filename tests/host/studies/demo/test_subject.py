@@ -1,3 +1,4 @@
+import json
 import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
@@ -99,11 +100,9 @@ def test_cubestar_solves_a_sky_and_a_picture(
 
 
 def test_photograph_has_the_truth_of_its_camera_file(tmp_path: Path) -> None:
-    truth = (
-        '{"images": {"missing.png": {}, "sky.png": '
-        '{"quaternion_xyzw_inertial_to_camera": [0, 0, 0, 1]}}}'
-    )
-    (tmp_path / "truth.json").write_text(truth, "utf-8")
+    known = {"quaternion_xyzw_inertial_to_camera": [0, 0, 0, 1]}
+    truth = {"images": {"missing.png": {}, "sky.png": known}}
+    (tmp_path / "truth.json").write_text(json.dumps(truth), "utf-8")
     Image.fromarray(np.zeros((1024, 1024), np.uint8)).save(tmp_path / "sky.png")
     subject = cubestar._photograph(tmp_path)
     assert subject.camera == tmp_path / "truth.json"
@@ -179,9 +178,7 @@ def shown(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return seen
 
 
-def test_demo_shows_all_devices_or_the_named_one(
-    run: Run, shown: list[str], tmp_path: Path
-) -> None:
+def test_demo_shows_all_devices_or_the_named_one(run: Run, shown: Any, tmp_path: Path) -> None:
     first, *_, last = device_names()
     assert run("demo", "--out", tmp_path).code == 1
     assert shown == list(device_names())

@@ -103,9 +103,8 @@ def test_cubestar_errors_count_right_attitudes_and_times_full_pictures() -> None
     assert found["off"] == pytest.approx(100 / 106)
     assert (found["cross_worst"], found["roll_worst"]) == pytest.approx((0.1, 0.2))
     assert found["cross95"] == pytest.approx(np.quantile([r.error_cross_deg for r in right], 0.95))
-    assert found["roll95"] == pytest.approx(
-        np.quantile([abs(r.error_roll_deg) for r in right], 0.95)
-    )
+    rolls = [abs(one.error_roll_deg) for one in right]
+    assert found["roll95"] == pytest.approx(np.quantile(rolls, 0.95))
     assert (found["algorithms_ms"], found["match_ms"], found["quest_ms"]) == (120, 40, 40)
 
 
@@ -129,9 +128,8 @@ def test_aramis_errors_are_in_arcsec_and_outcomes_are_counted() -> None:
     found = aramis._attitudes(results)  # type: ignore[arg-type]
     of = len(results) / 100
     shares = {"right": 10, "wrong": 1, "far": 1, "conclusive": 11, "ambiguous": 2, "none": 1}
-    assert {name: found[name] for name in shares} == pytest.approx(
-        {name: count / of for name, count in shares.items()}
-    )
+    expected = {name: count / of for name, count in shares.items()}
+    assert {name: found[name] for name in shares} == pytest.approx(expected)
     assert found["cross"] == pytest.approx(4.5)
     assert found["cross95"] == pytest.approx(np.quantile(range(10), 0.95))
     assert found["roll95"] == pytest.approx(np.quantile(range(0, 20, 2), 0.95))
@@ -181,17 +179,14 @@ def test_sun_errors_at_90_degrees() -> None:
     truth = {"truth_alpha_deg": 90.0, "truth_beta_deg": 0.0}
     times = {"phase_ms": {"wait": 1.0, "store": 1.0, "total": 2.0}}
     inner = one | truth | {"truth_alpha_deg": 1.0, "alpha_deg": 1.01, "error_deg": 0.01} | times
-    found = cubesense._sensor(
-        [SimpleNamespace(**one, **truth, **times), SimpleNamespace(**inner)]  # type: ignore[list-item]
-    )
+    results: list[Any] = [SimpleNamespace(**one, **truth, **times), SimpleNamespace(**inner)]
+    found = cubesense._sensor(results)
     assert found["worst_90"] == 0.05
     assert found["worst_rest"] == 0.05
     assert found["worst_30"] == 0.01
     assert np.isnan(found["mean_60"])
     behind = one | {"truth_alpha_deg": 90.5, "truth_beta_deg": 0.0} | times
-    found = cubesense._sensor(
-        [SimpleNamespace(**behind), SimpleNamespace(**inner)]  # type: ignore[list-item]
-    )
+    found = cubesense._sensor([SimpleNamespace(**behind), results[1]])
     assert found["worst"] == 0.05
     assert np.isnan(found["worst_90"])
     assert np.isnan(found["worst_rest"])

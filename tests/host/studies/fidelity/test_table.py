@@ -193,9 +193,8 @@ def test_remaining_time_scales_with_the_time_so_far(
     told = runs._Rest(jobs, quiet=False)
     assert [told(job) for job in jobs] == [1, 2, 3]
     times = [line.split("published: ")[1] for line in capsys.readouterr().err.splitlines()]
-    assert times == [
-        f"{took} s, about {rest} s to go" for took, rest in ((20, 100), (60, 60), (120, 0))
-    ]
+    expected = ((20, 100), (60, 60), (120, 0))
+    assert times == [f"{took} s, about {rest} s to go" for took, rest in expected]
 
 
 def test_quiet_counts_without_output(capsys: pytest.CaptureFixture[str]) -> None:
