@@ -1,5 +1,3 @@
-"""Orbit files: what they give, and one line for what is wrong in them."""
-
 from pathlib import Path
 
 import numpy as np
@@ -10,13 +8,11 @@ from cubestack.emulator.scene.file import SceneError
 from cubestack.emulator.scene.orbit import Inertial, NadirPointing, Waypoints
 from cubestack.emulator.scene.orbit_file import load_orbit
 
+from .test_orbit import VALLADO
+
 START = "start = 2026-11-24T12:00:00Z\n"
 CIRCLE = "[circular]\naltitude_km = 600\ninclination_deg = 97.8\nnode_deg = 20\n"
-LINES = (
-    "1 00005U 58002B   00179.78495062  .00000023  00000-0  28098-4 0  4753",
-    "2 00005  34.2682 348.7242 1859667 331.7664  19.3264 10.82419157413667",
-)
-TLE = f"tle = [{LINES[0]!r}, {LINES[1]!r}]\n"
+TLE = f"tle = [{VALLADO[0]!r}, {VALLADO[1]!r}]\n"
 
 
 def load(folder: Path, text: str):
@@ -84,8 +80,5 @@ def test_errors_are_one_line(tmp_path: Path, text: str, complaint: str) -> None:
     assert str(caught.value).startswith(str(tmp_path / "orbit.toml"))
     assert complaint in str(caught.value)
     assert "\n" not in str(caught.value)
-
-
-def test_reports_missing_file(tmp_path: Path) -> None:
     with pytest.raises(SceneError, match="can not be read"):
         load_orbit(tmp_path / "none.toml")

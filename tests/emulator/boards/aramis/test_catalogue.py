@@ -129,19 +129,25 @@ def test_cache_folder_that_cannot_be_created_is_ignored(tmp_path: Path, small: D
     assert cached(tmp_path / "file" / "x") == small.pack()
 
 
-def test_cache_keeps_the_last_two_lenses(small: Database, monkeypatch: pytest.MonkeyPatch) -> None:
-    made: list[float] = []
+@pytest.fixture
+def asked(monkeypatch: pytest.MonkeyPatch, small: Database) -> list[CatalogueParameters]:
+    """What databases are made of; each is the small one but for its field."""
+    parameters = list[CatalogueParameters]()
 
-    def make(parameters: CatalogueParameters, _progress: object) -> Database:
-        made.append(parameters.fov_deg)
-        return replace(small, fov_deg=parameters.fov_deg)
+    def make(of: CatalogueParameters, _progress: object) -> Database:
+        parameters.append(of)
+        return replace(small, fov_deg=of.fov_deg)
 
     monkeypatch.setattr(aramis_catalogue, "_kept", {})
     monkeypatch.setattr(aramis_catalogue, "cached_database", make)
-    asked = [10.0, 12.0, 10.0, 12.0, 14.0, 12.0, 14.0, 10.0]
-    given = [aramis_catalogue.onboard_database(field_deg).fov_deg for field_deg in asked]
-    assert given == asked
-    assert made == [10.0, 12.0, 14.0, 10.0]
+    return parameters
+
+
+def test_cache_keeps_the_last_two_lenses(asked: list[CatalogueParameters]) -> None:
+    fields_deg = [10.0, 12.0, 10.0, 12.0, 14.0, 12.0, 14.0, 10.0]
+    given = [aramis_catalogue.onboard_database(field_deg).fov_deg for field_deg in fields_deg]
+    assert given == fields_deg
+    assert [made.fov_deg for made in asked] == [10.0, 12.0, 14.0, 10.0]
 
 
 @pytest.mark.parametrize(
@@ -149,18 +155,10 @@ def test_cache_keeps_the_last_two_lenses(small: Database, monkeypatch: pytest.Mo
     [(0.0, FOV_DEG), (5e-4, FOV_DEG), (-5e-4, FOV_DEG), (2.0, FOV_DEG + 2)],
 )
 def test_rounded_default_field_reuses_the_default_catalogue(
-    monkeypatch: pytest.MonkeyPatch, small: Database, off_deg: float, made_for_deg: float
+    asked: list[CatalogueParameters], off_deg: float, made_for_deg: float
 ) -> None:
     """A lens file's rounded field is no reason to build another one."""
-    asked = list[CatalogueParameters]()
-
-    def made(parameters: CatalogueParameters, _progress: object) -> Database:
-        asked.append(parameters)
-        return small
-
-    monkeypatch.setattr(aramis_catalogue, "_kept", {})
-    monkeypatch.setattr(aramis_catalogue, "cached_database", made)
-    assert aramis_catalogue.onboard_database(FOV_DEG + off_deg) is small
+    assert aramis_catalogue.onboard_database(FOV_DEG + off_deg).fov_deg == made_for_deg
     assert asked == [CatalogueParameters(fov_deg=made_for_deg)]
 
 

@@ -205,19 +205,14 @@ PAGE = Path(__file__).parents[4] / "docs" / "sensors" / "protocols-aramis.md"
 NEXT_S = 1.5  #: From one request to the next: a measurement is over by then
 
 
-def exchanges() -> list[tuple[str, str]]:
+def test_examples_of_the_page() -> None:
     blocks = re.findall(r"```wire\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
     lines = [line for block in blocks for line in block.splitlines()]
-    sent = [line[3:] for line in lines if line.startswith("-> ")]
-    received = [line[3:] for line in lines if line.startswith("<- ")]
+    sent, received = ([line[3:] for line in lines if line[:3] == way] for way in ("-> ", "<- "))
     assert len(sent) == len(received) == len(lines) / 2 > 0
-    return list(zip(sent, received, strict=True))
-
-
-def test_examples_of_the_page() -> None:
     line = Desk().board.serial()
     line.read(1, 0.1)
-    for request, answer in exchanges():
+    for request, answer in zip(sent, received, strict=True):
         line.write(bytes.fromhex(request))
         found = b""
         while data := line.read(1000, NEXT_S if not found else 0.01):

@@ -11,16 +11,8 @@ from cubestack.host.export.processor import processor_header
 
 PROGRAMS = Path(__file__).parent / "firmware"
 COMPILER = shutil.which("arm-none-eabi-gcc")
-FLAGS = (
-    "-mcpu=cortex-m3",
-    "-mthumb",
-    "-O2",
-    "-g",
-    "-Wall",
-    "-Werror",
-    "-ffreestanding",
-    "-nostdlib",
-)
+PART = ("-mcpu=cortex-m3", "-mthumb", "-ffreestanding", "-nostdlib")
+FLAGS = (*PART, "-O2", "-g", "-Wall", "-Werror")
 
 needs_toolchain = pytest.mark.skipif(COMPILER is None, reason="needs gcc-arm-none-eabi")
 

@@ -7,7 +7,6 @@ from cubestack.emulator.camera.common.exposure import star_light, star_pixels
 from cubestack.emulator.camera.mlx75412.lens import LENS
 from cubestack.emulator.scene.earth import angular_radius_deg
 from cubestack.emulator.scene.earth_sun import CameraTarget, EarthSunScene
-from cubestack.emulator.scene.file import SceneError
 from cubestack.emulator.scene.hazards import EARTH_HAZARDS, Clouds, EarthInSunCamera, Terminator
 from cubestack.emulator.scene.hazards.contract import EARTH_RADIANCE
 from cubestack.emulator.scene.hazards.earth_limb import EarthLimb, airglow_s10
@@ -136,11 +135,6 @@ def test_is_placed_with_the_limb_at_an_angle(angle_deg: float) -> None:
     assert to_nadir - RADIUS_DEG == pytest.approx(angle_deg, abs=1e-6)
     assert hazard.sun is not None
     assert np.array(hazard.sun) @ NOW.boresight <= 0.5 + 1e-9
-
-
-def test_rejects_impossible_values() -> None:
-    with pytest.raises(SceneError, match="sun must be 3 numbers"):
-        EarthLimb(sun=(0.0, 0.0, 0.0))
 
 
 def test_light_is_looked_for_two_coarse_pixels_beyond_the_disc() -> None:

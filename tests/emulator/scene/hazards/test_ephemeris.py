@@ -64,65 +64,28 @@ def test_velocity_of_the_earth() -> None:
     np.testing.assert_allclose(ephemeris.earth_velocity_km_s(DATE), right, atol=0.05)
 
 
-#: Heliocentric places by ERFA's plan94, another theory, on 1850-01-29, 1950-01-01 and 2047-10-15.
-PLACES = {
-    "mercury": (
-        (0.25680, -0.28910, -0.18109),
-        (0.32088, 0.09952, 0.01983),
-        (0.27939, 0.15691, 0.05489),
-    ),
-    "venus": (
-        (-0.27662, -0.61812, -0.26024),
-        (0.09428, 0.65330, 0.28783),
-        (0.27846, 0.61308, 0.25830),
-    ),
-    "earth": (
-        (-0.21100, 0.88098, 0.38230),
-        (-0.18271, 0.88638, 0.38441),
-        (0.91844, 0.35568, 0.15415),
-    ),
-    "mars": (
-        (-0.14098, 1.43238, 0.66076),
-        (-1.39554, 0.80849, 0.40870),
-        (-1.36055, 0.85436, 0.42851),
-    ),
-    "jupiter": (
-        (-5.23700, 1.23151, 0.65591),
-        (3.40640, -3.42580, -1.55161),
-        (3.36935, 3.40893, 1.37920),
-    ),
-    "saturn": (
-        (9.29609, 1.64610, 0.28086),
-        (-9.00684, 2.17002, 1.28327),
-        (0.72596, -9.24939, -3.85197),
-    ),
-    "uranus": (
-        (17.69941, 8.42046, 3.43699),
-        (-1.23491, 17.31054, 7.59939),
-        (-16.81213, 6.54441, 3.10412),
-    ),
-    "neptune": (
-        (27.44139, -10.91034, -5.14855),
-        (-29.09373, -8.04979, -2.57073),
-        (19.40787, 21.11271, 8.15846),
-    ),
-}
+#: The error in arcseconds that a planet's places may have, and heliocentric ones by ERFA's plan94,
+#: another theory, on 1850-01-29, 1950-01-01 and 2047-10-15.
+PLACES = """\
+mercury 15 0.25680 -0.28910 -0.18109 0.32088 0.09952 0.01983 0.27939 0.15691 0.05489
+venus 20 -0.27662 -0.61812 -0.26024 0.09428 0.65330 0.28783 0.27846 0.61308 0.25830
+earth 15 -0.21100 0.88098 0.38230 -0.18271 0.88638 0.38441 0.91844 0.35568 0.15415
+mars 25 -0.14098 1.43238 0.66076 -1.39554 0.80849 0.40870 -1.36055 0.85436 0.42851
+jupiter 400 -5.23700 1.23151 0.65591 3.40640 -3.42580 -1.55161 3.36935 3.40893 1.37920
+saturn 560 9.29609 1.64610 0.28086 -9.00684 2.17002 1.28327 0.72596 -9.24939 -3.85197
+uranus 70 17.69941 8.42046 3.43699 -1.23491 17.31054 7.59939 -16.81213 6.54441 3.10412
+neptune 45 27.44139 -10.91034 -5.14855 -29.09373 -8.04979 -2.57073 19.40787 21.11271 8.15846
+"""
 
 
-@pytest.mark.parametrize(
-    ("planet", "within_arcsec"),
-    [
-        ("mercury", 15), ("venus", 20), ("earth", 15), ("mars", 25),
-        ("jupiter", 400), ("saturn", 560), ("uranus", 70), ("neptune", 45),
-    ],
-)  # fmt: skip
-def test_two_centuries_of_places(planet: str, within_arcsec: float) -> None:
-    there = np.array(PLACES[planet])
-    found = np.array(
-        [ephemeris.heliocentric(planet, at) for at in (2396758.5, 2433282.5, 2469000.5)]
-    )
+@pytest.mark.parametrize("line", PLACES.splitlines(), ids=lambda line: line.split()[0])
+def test_two_centuries_of_places(line: str) -> None:
+    planet, within_arcsec, *places = line.split()
+    there = np.reshape([float(number) for number in places], (3, 3))
+    dates = (2396758.5, 2433282.5, 2469000.5)
+    found = np.array([ephemeris.heliocentric(planet, at) for at in dates])
     off = np.linalg.norm(found - there, axis=1) / np.linalg.norm(there, axis=1)
-    assert np.degrees(np.sqrt(np.mean(off**2))) * 3600 < within_arcsec
+    assert np.degrees(np.sqrt(np.mean(off**2))) * 3600 < float(within_arcsec)
 
 
 @pytest.mark.parametrize(
