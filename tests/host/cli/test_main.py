@@ -13,8 +13,10 @@ from PIL import Image
 from cubestack.emulator.native.compiler import find_compiler
 from cubestack.host.cli import commands as registry
 from cubestack.host.cli.commands import commands, reports
+from cubestack.host.cli.export import OF_INTERFACE, OF_PROCESSOR
 from cubestack.host.cli.measure import _are_right
 from cubestack.host.devices.experiment import Result
+from cubestack.host.devices.registry import devices
 from cubestack.host.studies.cubestar.demo import RENDERED
 
 from ...conftest import Outcome, Run
@@ -58,24 +60,33 @@ def test_command_without_emulation_imports_no_emulator(words: str) -> None:
 
 
 @pytest.mark.parametrize("command", [None, *commands(), *reports()])
-def test_help_exits_with_0(run: Run, command: str | None) -> None:
+def test_help_exits_with_0_and_links_to_the_documents_it_names(
+    run: Run, command: str | None
+) -> None:
     outcome = run(*([command] if command else []), "--help")
     assert outcome.code == DONE
     assert outcome.out.startswith("usage: cubestack")
     assert outcome.err == ""
+    assert ("docs/" in outcome.out) == ("\ndocs/: https://" in outcome.out)
+    assert "docs/" in outcome.out or command != "emulate"
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
-    [("kind = sky", "not a TOML file"), ('kind = "picture"\nfile = "none.png"', "none.png")],
+    ("device", "text", "words"),
+    [
+        ("cubestar", "kind = sky", ["not a TOML file"]),
+        ("cubestar", 'kind = "picture"\nfile = "none.png"', ["none.png"]),
+        ("cubestar", 'kind = "earth-sun"\n', ["sky", "earth-sun"]),
+        ("cubesense", 'kind = "sky"\nra_deg = 1\ndec_deg = 1\n', ["earth-sun", "sky"]),
+    ],
 )
 @pytest.mark.parametrize("command", ["measure", "emulate"])
 def test_rejects_invalid_scene_files(
-    run: Run, tmp_path: Path, command: str, text: str, said: str
+    run: Run, tmp_path: Path, command: str, device: str, text: str, words: list[str]
 ) -> None:
     scene = tmp_path / "scene.toml"
     scene.write_text(text, encoding="utf-8")
-    check_one_line(run(command, "cubestar", "--scene", scene), "scene.toml", said)
+    check_one_line(run(command, device, "--scene", scene), "scene.toml", *words)
 
 
 @pytest.mark.parametrize(
@@ -102,15 +113,13 @@ def test_rejects_other_picture_formats(run: Run, tmp_path: Path) -> None:
     )
 
 
-def test_rejects_invalid_camera_files(run: Run, tmp_path: Path) -> None:
+def test_camera_file_is_checked_and_without_the_picture_has_no_truth(
+    run: Run, tmp_path: Path
+) -> None:
     picture, camera = dark_picture(tmp_path / "sky.png"), tmp_path / "camera.json"
     camera.write_text("{}", encoding="utf-8")
     outcome = run("measure", "cubestar", "--image", picture, "--camera", camera)
     check_one_line(outcome, "camera.json", "f_px")
-
-
-def test_camera_file_without_the_picture_has_no_truth(run: Run, tmp_path: Path) -> None:
-    picture, camera = dark_picture(tmp_path / "sky.png"), tmp_path / "camera.json"
     camera.write_text('{"f_px": 1071, "cx_px": 512, "cy_px": 256}', encoding="utf-8")
     outcome = run("measure", "cubestar", "--image", picture, "--camera", camera, "--json")
     assert outcome.code == FAILED  # the picture is black
@@ -163,13 +172,20 @@ def test_memory_report_names_every_buffer_and_fits(run: Run) -> None:
     assert all(name in table.out for name in ram["buffers"])
 
 
-@pytest.mark.parametrize("command", ["measure", "emulate"])
-def test_rejects_the_scene_of_another_device(run: Run, tmp_path: Path, command: str) -> None:
-    scene = tmp_path / "scene.toml"
-    scene.write_text('kind = "sky"\nra_deg = 1\ndec_deg = 1\n', encoding="utf-8")
-    check_one_line(run(command, "cubesense", "--scene", scene), "scene.toml", "earth-sun", "sky")
-    scene.write_text('kind = "earth-sun"\n', encoding="utf-8")
-    check_one_line(run(command, "cubestar", "--scene", scene), "scene.toml", "sky", "earth-sun")
+@pytest.mark.parametrize("form", [*OF_INTERFACE, *OF_PROCESSOR])
+def test_out_writes_the_printed_text(form: str, run: Run, tmp_path: Path) -> None:
+    for device in devices():
+        printed = run("export", device.name, "--format", form)
+        if form in OF_PROCESSOR and device.processor is None:
+            assert (printed.code, printed.line) == (
+                2,
+                f"cubestack export: the processor of {device.name} runs no firmware of your own",
+            )
+            continue
+        assert (printed.code, printed.err) == (0, "")
+        path = tmp_path / "file"
+        assert run("export", device.name, "--format", form, "--out", path) == (0, "", "")
+        assert path.read_text(encoding="utf-8") == printed.out
 
 
 @dataclass(frozen=True)

@@ -7,12 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from cubestack.host.cli.commands import commands
+from cubestack.host.errors import install_command
 from tests.tiers import quick
 
-from ...conftest import Run
-
-FAILED, WRONG_CALL = 1, 2
+CALL = [sys.executable, "-m", "cubestack"]
 
 
 def process(text: str, **environment: str) -> "subprocess.CompletedProcess[str]":
@@ -77,15 +75,34 @@ def test_commands_run_in_an_ascii_locale(words: tuple[str, ...]) -> None:
     assert done.stdout
 
 
-@pytest.mark.parametrize("command", commands())
-def test_help_links_to_the_documents_it_names(run: Run, command: str) -> None:
-    shown = run(command, "--help").out
-    assert ("docs/" in shown) == ("\ndocs/: https://" in shown)
-    assert "docs/" in shown or command != "emulate"
+@pytest.mark.parametrize(
+    ("words", "file"),
+    [
+        (["emulated:cubestar", "--scene", "/none.toml"], "/none.toml"),
+        (["/dev/nothing", "--device", "cubestar"], "/dev/nothing"),
+    ],
+)
+def test_missing_file_or_port_is_named(words: list[str], file: str) -> None:
+    ended = subprocess.run([*CALL, "ground", *words], capture_output=True, text=True, timeout=60)
+    assert ended.returncode == 1
+    assert file in ended.stderr.splitlines()[-1]
+
+
+CONTROLLED = ["emulate", "cubestar", "--tcp", "0", "--control", "0"]
+
+
+@pytest.mark.parametrize("missing", quick(["starlette", "uvicorn", "websockets"], 1))
+@pytest.mark.parametrize("words", [["ground", "emulated:cubestar"], CONTROLLED])
+def test_missing_dependency_names_the_extra(words: list[str], missing: str) -> None:
+    ended = process(
+        f"import sys; sys.modules['{missing}'] = None; from cubestack.host.cli.main import main; "
+        f"sys.exit(main({words}))"
+    )
+    assert ended.returncode == 2
+    assert ended.stderr.endswith(f"this needs {missing}: {install_command('ground')}\n")
 
 
 SOON_S = 60.0
-CALL = [sys.executable, "-m", "cubestack"]
 
 
 def begun(*words: str) -> "subprocess.Popen[str]":

@@ -135,6 +135,14 @@ def test_option_of_one_device_is_rejected_for_several(run: Run, option: str) -> 
         ),
         (("measure", "cubestar", "--firmware", "{folder}"), "{folder}: Is a directory"),
         (
+            ("export", "aramis", "--format", "c", "--out", "{folder}"),
+            "--out {folder} is a folder; name a file in it",
+        ),
+        (
+            ("export", "aramis", "--format", "c", "--out", "{folder}/not/there.h"),
+            "{folder}/not/there.h: No such file or directory",
+        ),
+        (
             ("shell", "/dev/ttyNONE", "--device", "cubestar"),
             "can not open /dev/ttyNONE: No such file or directory",
         ),
@@ -164,6 +172,6 @@ def test_error_is_one_plain_line(
     run: Run, tmp_path: Path, words: tuple[str, ...], said: str
 ) -> None:
     outcome = run(*(word.format(folder=tmp_path) for word in words))
-    wrong_call = words[0] == "measure" or said.startswith("--listen")
+    wrong_call = words[0] == "measure" or said.startswith("--")
     assert outcome.code == (WRONG_CALL if wrong_call else FAILED)
     assert outcome.line == f"cubestack {words[0]}: {said.format(folder=tmp_path)}"
