@@ -1,5 +1,3 @@
-"""Behaviour common to all boards: several share one kernel and one bus."""
-
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from typing import Any
@@ -128,7 +126,6 @@ def test_lines_and_probes(stack: ExitStack) -> None:
 
 def test_pending_work_finishes_before_the_board_closes() -> None:
     board, done = BOARDS["cubestar"](), []
-    assert board.engine is not None
     close = board.engine.close
     board.engine.close = lambda: (done.append("engine"), close())[1]  # type: ignore[method-assign]
     board.on_close += [lambda: done.append("first"), lambda: done.append("second")]

@@ -122,9 +122,8 @@ def test_others_on_the_bus_and_a_camera_without_power_do_not_answer() -> None:
         assert bus.say(OutgoingKind.I2C_START, address_byte) == (False,)
     assert bus.say(OutgoingKind.I2C_WRITE, 1) == (False,)
     bus.say(OutgoingKind.I2C_STOP)
-    assert (
-        bus.say(OutgoingKind.I2C_START, CAMERA << 1, unit=(SDA + 1) << 8 | 1) is None
-    )  # other pins
+    other_pins = (SDA + 1) << 8 | 1
+    assert bus.say(OutgoingKind.I2C_START, CAMERA << 1, unit=other_pins) is None
     assert bus.say(OutgoingKind.PIN, 1) is None
     bus.camera.power(False, 0)
     assert bus.say(OutgoingKind.I2C_START, CAMERA << 1) == (False,)

@@ -25,9 +25,6 @@ def test_pins_are_those_of_the_processor_and_the_outputs() -> None:
     engine = SimpleNamespace(wiring=wiring, get_pin=levels.__getitem__)
     assert monitor(engine)(["pins"]) == "ENABLE 0x1\nRNW 0x0\nACK 0x1\nDATA 0x5a"
     assert monitor(None)(["pins"]) == "no FPGA"
-
-
-def test_rejects_unknown_pin_commands() -> None:
     with pytest.raises(ValueError, match="no command 'pin'; known: reset, catch, help, time"):
         monitor(None)(["pin"])
 
@@ -90,18 +87,16 @@ def test_rejects_unknown_addresses_and_names() -> None:
         look("CMU.X")
 
 
-def lengths() -> dict[int, int]:
-    return {region.start: region.length for region in REGIONS}
+LENGTHS = {region.start: region.length for region in REGIONS}
 
 
 def test_memories_are_as_large_as_the_part_s() -> None:
     """EFM32GG Reference Manual, figure 5.2: RAM is in the code space too, and bit by bit."""
-    found = lengths()
-    assert found[0] == FLASH_BYTES == 1 << 20
-    assert found[0x1000_0000] == found[0x2000_0000] == RAM_BYTES == 128 * 1024
-    assert found[0x2200_0000] == 32 * RAM_BYTES
-    assert found[0x8000_0000] == 4 * (64 << 20)  # the banks of the external bus
-    assert found[0xE000_0000] == 0x10_0000
+    assert LENGTHS[0] == FLASH_BYTES == 1 << 20
+    assert LENGTHS[0x1000_0000] == LENGTHS[0x2000_0000] == RAM_BYTES == 128 * 1024
+    assert LENGTHS[0x2200_0000] == 32 * RAM_BYTES
+    assert LENGTHS[0x8000_0000] == 4 * (64 << 20)  # the banks of the external bus
+    assert LENGTHS[0xE000_0000] == 0x10_0000
     (flash,) = [region for region in REGIONS if region.kind == "flash"]
     assert flash.block == 4096
 
@@ -109,7 +104,7 @@ def test_memories_are_as_large_as_the_part_s() -> None:
 def test_each_peripheral_and_information_page_is_in_a_region() -> None:
     places = [instance.base for layout in LAYOUTS for instance in layout.instances]
     for place in (*places, 0x0FE0_0000, 0x0FE0_4000, 0x0FE0_8000, 0x0FE0_81FC):
-        assert any(start <= place < start + length for start, length in lengths().items())
+        assert any(start <= place < start + length for start, length in LENGTHS.items())
     ends = sorted((region.start, region.start + region.length) for region in REGIONS)
     assert all(end <= start for (_, end), (start, _) in itertools.pairwise(ends))
     assert ends[-1][1] <= 1 << 32

@@ -1,5 +1,3 @@
-"""The board of a plain node: pins of its processor, and checks of its declaration."""
-
 from collections.abc import Callable, Mapping
 from types import SimpleNamespace
 from typing import Any

@@ -1,5 +1,3 @@
-"""A scene is the same after saving and loading, and its bodies are where it says."""
-
 import re
 from dataclasses import fields, is_dataclass
 from pathlib import Path
@@ -7,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from cubestack.emulator.camera.common.scene_file import load_scene
 from cubestack.emulator.camera.common.scene_form import outline, sky_form
@@ -88,21 +87,16 @@ def test_saves_only_values_that_differ_from_defaults(tmp_path: Path) -> None:
         **{"kind": "sky", "ra_deg": 84.0, "dec_deg": -1.0, "roll_deg": 0.0},
         "optics": {"psf_sigma_px": 2.0},
     }
-    assert EARTH.table(load(save(tmp_path, 'kind = "earth-sun"'))) == {
-        **{"kind": "earth-sun", "nadir": [0, 0, 1], "sun": [0, 0, -1]}
-    }
+    table = EARTH.table(load(save(tmp_path, 'kind = "earth-sun"')))
+    assert table == {"kind": "earth-sun", "nadir": [0, 0, 1], "sun": [0, 0, -1]}
 
 
 def test_saves_photographs_too(tmp_path: Path) -> None:
-    from PIL import Image
-
     Image.new("L", (1100, 700), 9).save(tmp_path / "p.png")
     text = 'kind = "picture"\nfile = "p.png"\ncrop = [3, 4]\ntemperature_c = 3'
     table = SKY.table(load_scene(save(tmp_path, text), CONDITION))
-    assert table == {
-        **{"kind": "picture", "file": str(tmp_path / "p.png"), "crop": [3, 4]},
-        "temperature_c": 3.0,
-    }
+    place = {"kind": "picture", "file": str(tmp_path / "p.png")}
+    assert table == place | {"crop": [3, 4], "temperature_c": 3.0}
 
 
 def test_the_sky_is_seen_where_the_camera_looks(tmp_path: Path) -> None:

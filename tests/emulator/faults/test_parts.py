@@ -1,5 +1,3 @@
-"""Upsets of memories and of a processor's registers: how many, where, and when."""
-
 import numpy as np
 import pytest
 

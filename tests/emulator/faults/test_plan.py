@@ -1,5 +1,3 @@
-"""Plans: what a file says is what is injected, and nonsense is refused with its place."""
-
 import random
 from contextlib import suppress
 from pathlib import Path
@@ -113,11 +111,9 @@ def test_any_value_raises_at_most_a_fault_error(name: str, value: object) -> Non
                 table.make_fault(kind, **{known: value})
 
 
-def test_the_document_has_the_table_as_declared() -> None:
-    assert table.markdown_table() in DOCUMENT.read_text(encoding="utf-8")
-
-
-def test_the_document_has_a_reaction_to_every_fault() -> None:
-    reactions = DOCUMENT.read_text(encoding="utf-8").split("## What the firmware does about it")[1]
+def test_the_document_has_the_table_as_declared_and_a_reaction_to_every_fault() -> None:
+    text = DOCUMENT.read_text(encoding="utf-8")
+    assert table.markdown_table() in text
+    reactions = text.split("## What the firmware does about it")[1]
     for kind in table.FAULTS:
         assert f"| `{kind}` |" in reactions

@@ -1,5 +1,3 @@
-"""Transactions on the external bus, in bulk and pin by pin; upsets of the design's registers."""
-
 from collections.abc import Iterator
 from dataclasses import replace
 from fractions import Fraction
@@ -49,13 +47,11 @@ def transactions(addresses, data=None, **options) -> Transactions:
 
 
 def controls(wiring: Wiring) -> list[str]:
-    assert wiring.bus is not None
     mine = {*wiring.bus.selects, "AD_HIGH", "AD_LOW_I", "ALE", "RE_N", "WE_N"}
     return [pin for pin in wiring.mcu_pins if pin not in mine]
 
 
 def random_access(rng: np.random.Generator, wiring: Wiring) -> tuple[Transactions, int]:
-    assert wiring.bus is not None
     count = int(rng.integers(0, 12))
     addresses = rng.integers(0, 1 << 24 if rng.random() < 0.1 else 4 * COLUMNS * ROWS, count)
     timing = BusTiming(*(int(cycles) for cycles in rng.integers(1, 4, 5)))
@@ -236,8 +232,7 @@ def test_registers_have_the_names_of_the_design(engine: CompiledEngine) -> None:
 
 
 def test_every_bit_of_a_running_reader_moves_the_address(engine: CompiledEngine) -> None:
-    engine.set_pin("RNW", 1)
-    engine.set_pin("ENABLE", 1)
+    opened(engine)
     for _ in range(3):
         engine.set_pin("DCLK", 1)
         engine.set_pin("DCLK", 0)
@@ -253,8 +248,7 @@ def test_every_bit_of_a_running_reader_moves_the_address(engine: CompiledEngine)
 def test_a_bit_turns_over_in_the_middle_of_a_transfer(engine: CompiledEngine) -> None:
     memory = next(iter(engine.memories.values())).reshape(-1)
     memory[:] = np.random.default_rng(1).integers(0, 256, memory.size)
-    engine.set_pin("RNW", 1)
-    engine.set_pin("ENABLE", 1)
+    opened(engine)
     sent = np.zeros(40, np.uint8)
     period = Fraction(100_000)
     engine.flip("reader.counter.column", 8, engine.now_ps + 20 * int(period))

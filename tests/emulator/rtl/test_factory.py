@@ -1,5 +1,3 @@
-"""Which engine is made, with a compiler and without."""
-
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any

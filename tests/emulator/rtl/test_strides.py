@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from fractions import Fraction
+from functools import partial
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from cubestack.emulator.rtl.contract import RtlEngine
 from cubestack.emulator.rtl.cxxrtl.engine import CompiledEngine
 from cubestack.emulator.rtl.sram import SramTiming
 from cubestack.emulator.rtl.wiring import Wiring
-from tests.emulator.rtl.cameras import ListCamera, assert_same
+from tests.emulator.rtl.cameras import ListCamera, assert_same, read
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
 
@@ -91,13 +92,8 @@ def test_bytes_are_read_alike(seed: int) -> None:
         for number in range(40):
             count = int(rng.integers(1, 4000))
             period = Fraction(int(rng.integers(30_000, 900_000)), int(rng.integers(1, 4)))
-
-            def read(engine: RtlEngine, c: int = count, p: Fraction = period) -> bytes:
-                out = np.empty(c, np.uint8)
-                until_ps = engine.now_ps + int(c * p * Fraction(9, 10))
-                return out[: engine.strobe_read(out, p, until_ps)].tobytes()
-
-            step(engines, read, number)
+            reach_ps = int(count * period * Fraction(9, 10))
+            step(engines, partial(read, count=count, period=period, reach=reach_ps), number)
             if number % 8 == 7:
                 register = ("reader.counter.column", "reader.counter.row")[number // 8 % 2]
                 later_ps = engines[0].now_ps + int(rng.integers(10**9))
@@ -119,13 +115,7 @@ def test_slow_memory_violates_the_same_rules(timing: SramTiming) -> None:
             engine.set_pin("ENABLE", 0)
             engine.set_pin("RNW", 1)
             engine.set_pin("ENABLE", 1)
-
-        def read(engine: RtlEngine) -> bytes:
-            out = np.empty(3000, np.uint8)
-            engine.strobe_read(out, Fraction(770_000), engine.now_ps + 10**12)
-            return out.tobytes()
-
-        step(engines, read, "read")
+        step(engines, lambda engine: read(engine, 3000, Fraction(770_000), 10**12), "read")
         assert engines[0].violation_counts
 
 

@@ -1,5 +1,3 @@
-"""The wirings of boards, and calls with names that they do not have."""
-
 from fractions import Fraction
 from itertools import product
 

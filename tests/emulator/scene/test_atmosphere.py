@@ -1,5 +1,3 @@
-"""The air above a camera, against published tables and plain statistics."""
-
 from datetime import UTC, datetime
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""The orbit against what others publish, and against geometry."""
-
 from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Any

@@ -1,5 +1,3 @@
-"""A star tracker, at rest and active."""
-
 from functools import lru_cache
 from typing import Any
 

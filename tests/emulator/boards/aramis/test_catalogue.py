@@ -102,18 +102,16 @@ def test_a_shorter_side_leaves_fewer_triangles(small: Database) -> None:
     assert len(fewer.numbers) == len(small.numbers)
 
 
-def test_caches_database(tmp_path: Path, small: Database, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_caches_each_database_in_a_file_of_its_own(
+    tmp_path: Path, small: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
     first = cached(tmp_path / "new")
     (file,) = (tmp_path / "new").iterdir()
     assert first == small.pack() == file.read_bytes()
+    cached(tmp_path / "new", replace(SMALL, mag_limit=2.9))
+    assert len(list((tmp_path / "new").iterdir())) == 2
     monkeypatch.setattr(aramis_catalogue, "build_database", None)
     assert cached(tmp_path / "new") == small.pack()
-
-
-def test_each_parameter_set_has_its_own_cache_file(tmp_path: Path) -> None:
-    cached(tmp_path)
-    cached(tmp_path, replace(SMALL, mag_limit=2.9))
-    assert len(list(tmp_path.iterdir())) == 2
 
 
 def test_damaged_cache_file_is_rebuilt(tmp_path: Path, small: Database) -> None:

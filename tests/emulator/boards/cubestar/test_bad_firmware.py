@@ -1,5 +1,3 @@
-"""Bad firmware on the board: a report of one screen, and time continues."""
-
 import numpy as np
 import pytest
 

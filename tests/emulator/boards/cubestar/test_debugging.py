@@ -70,8 +70,6 @@ def variable(board: CubeStarFirmwareBoard, name: str) -> int:
 
 def session(board: CubeStarFirmwareBoard, endpoint: GdbEndpoint, script: str) -> str:
     """GDB's output for the commands in ``script``; virtual time runs while GDB lets it."""
-    assert GDB is not None
-    assert board.image.path is not None
     first = f"set confirm off; set pagination off; target remote {endpoint.name}"
     commands = f"{first}; {script}".split("; ")
     words = [word for command in commands for word in ("-ex", command)]
@@ -194,7 +192,6 @@ def test_trace_is_identical_with_and_without_gdb(image: Image) -> None:
         debugger.serve = resume
         for name in ("uart_handler", "systick_handler"):
             function = symbols.function(name)
-            assert function is not None
             debugger.set_breakpoint(function.address, True)
         debugger.set_watchpoint(symbols.variables["received"].address, 4, "write", True)
         return halts

@@ -136,15 +136,9 @@ def test_vignetting() -> None:
     np.testing.assert_allclose(natural.transmission(vectors), [1, np.cos(0.5) ** 4])
 
 
-@pytest.mark.parametrize(
-    ("changes", "complaint"),
-    [
-        ({"k1": -1.5}, "folds the picture within the sensor"),
-        ({"k1": 1.5, "distortion": Distortion.TOOLBOX}, "folds the picture within the sensor"),
-    ],
-)
-def test_rejects_impossible_lenses(changes: dict[str, Any], complaint: str) -> None:
-    with pytest.raises(ValueError, match=complaint):
+@pytest.mark.parametrize("changes", [{"k1": -1.5}, {"k1": 1.5, "distortion": Distortion.TOOLBOX}])
+def test_rejects_impossible_lenses(changes: dict[str, Any]) -> None:
+    with pytest.raises(ValueError, match="folds the picture within the sensor"):
         replace(LENS, **changes)
 
 
@@ -153,19 +147,10 @@ def test_a_picture_may_fold_right_outside_of_the_outermost_pixel(cx: float, cy: 
     """r + k1 r^3 turns back where 3 k1 r^2 = -1; the farthest corner may be as near as that."""
     across, down = max(cx + 0.5, 63.5 - cx), max(cy + 0.5, 47.5 - cy)
     turn = -(LENS.fx**2) / (3 * (across**2 + down**2))
-    small = {
-        "columns": 64,
-        "rows": 48,
-        "cx": cx,
-        "cy": cy,
-        "fy": LENS.fx,
-        "k2": 0,
-        "p1": 0,
-        "p2": 0,
-    }
-    replace(LENS, k1=0.99 * turn, **small)
+    small = replace(LENS, columns=64, rows=48, cx=cx, cy=cy, fy=LENS.fx, k1=0, k2=0, p1=0, p2=0)
+    replace(small, k1=0.99 * turn)
     with pytest.raises(ValueError, match="folds the picture within the sensor"):
-        replace(LENS, k1=1.01 * turn, **small)
+        replace(small, k1=1.01 * turn)
 
 
 def test_the_firmware_is_calibrated_to_the_lens() -> None:
@@ -240,6 +225,5 @@ def test_nan_points_stay_nan() -> None:
     some[3] = np.nan
     seen = displace(some, (RESIDUAL,))
     assert np.isnan(seen[3]).all()
-    np.testing.assert_array_equal(
-        np.delete(seen, 3, 0), np.delete(displace(PIXELS, (RESIDUAL,)), 3, 0)
-    )
+    others = np.delete(displace(PIXELS, (RESIDUAL,)), 3, 0)
+    np.testing.assert_array_equal(np.delete(seen, 3, 0), others)

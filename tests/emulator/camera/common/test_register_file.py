@@ -19,10 +19,13 @@ def registers() -> RegisterFile:
     return RegisterFile(table.CameraRegisterMap("TEST1", 0x21, 1, (MODE, RATE, FANCY, CHIP)))
 
 
-def test_reset_values_can_be_read_in_order(registers: RegisterFile) -> None:
+def test_reset_values_can_be_read_in_order_and_the_pointer_wraps(registers: RegisterFile) -> None:
     registers.select(0x10)
     assert [registers.read() for _ in range(5)] == [1, 2, 3, 0, 0x42]
     assert registers.active("RATE") == 0x0203
+    registers.select(0xFF)
+    registers.read()
+    assert registers.read() == 0  # address 0x00
 
 
 def test_register_at_once_and_register_with_sync(registers: RegisterFile) -> None:
@@ -42,12 +45,6 @@ def test_stored_by_the_camera(registers: RegisterFile) -> None:
     assert registers.active("RATE") == 0x1234
     registers.select(0x11)
     assert registers.read() == 0x12
-
-
-def test_pointer_wraps(registers: RegisterFile) -> None:
-    registers.select(0xFF)
-    registers.read()
-    assert registers.read() == 0  # address 0x00
 
 
 @pytest.mark.parametrize(
@@ -76,21 +73,14 @@ def test_logs_unmodelled_writes(
 
 def test_logs_unmodelled_reads(registers: RegisterFile, caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level(logging.INFO):
+        registers.select(0x10)
+        registers.write(1)  # which is modelled
         registers.select(0x13)
         assert [registers.read(), registers.read(), registers.read()] == [0, 0x42, 0]
     assert caplog.messages == [
         "TEST1: read FANCY, which is not modelled",
         "TEST1: read 0x0015, where no register is known",
     ]
-
-
-def test_modelled_access_logs_nothing(
-    registers: RegisterFile, caplog: pytest.LogCaptureFixture
-) -> None:
-    with caplog.at_level(logging.DEBUG):
-        registers.select(0x10)
-        registers.write(1)
-    assert not caplog.records
 
 
 def test_registers_of_sixteen_bits_behind_one_address() -> None:

@@ -1,4 +1,3 @@
-import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,7 +17,7 @@ from cubestack.emulator.scene.attitude import (
     quaternion_from_pointing,
 )
 from cubestack.emulator.scene.hazards import Moon
-from cubestack.emulator.scene.sky import PictureScene, SceneError, SkyScene
+from cubestack.emulator.scene.sky import SceneError, SkyScene
 
 from ..conftest import check_refused, save
 
@@ -55,7 +54,6 @@ quaternion = [0, 0, 0, 2]
 def test_sky_from_a_file(tmp_path: Path) -> None:
     view = load(save(tmp_path, SCENE))
     scene, condition = view.scene, view.condition
-    assert isinstance(scene, SkyScene)
     np.testing.assert_allclose(scene.quaternion, quaternion_from_pointing(83.8, -5, 30))
     assert tuple(scene.rate_deg_s) == (0.0, 0.1, 0.0)
     assert (scene.mag_limit, scene.epoch, scene.seed) == (3.8, 2030.5, 7)
@@ -72,12 +70,10 @@ def test_sky_from_a_file(tmp_path: Path) -> None:
 
 def test_shortest_files(tmp_path: Path) -> None:
     view = load(save(tmp_path, 'kind = "sky"\nra_deg = 1\ndec_deg = 2'))
-    assert isinstance(view.scene, SkyScene)
     assert view.scene.mag_limit is None
     assert view.condition == CONDITION
     Image.new("L", (1024, 512), 9).save(tmp_path / "p.png")
     picture = load(save(tmp_path, 'kind = "picture"\nfile = "p.png"')).scene
-    assert isinstance(picture, PictureScene)
     assert picture.truth(0) is None
     assert np.all(picture.pixels == 9)
 
@@ -87,7 +83,6 @@ def test_picture_from_a_file(tmp_path: Path) -> None:
     text = 'kind = "picture"\nfile = "p.png"\ncrop = [70, 180]\nexposure_ms = 5\n'
     view = load(save(tmp_path, text + "quaternion = [0, 2, 0, 0]\ntemperature_c = 3"))
     scene = view.scene
-    assert isinstance(scene, PictureScene)
     assert (scene.crop, scene.exposure_ms) == ((70, 180), 5.0)
     assert view.condition == replace(CONDITION, temperature_c=3.0)
     np.testing.assert_array_equal(scene.truth(10**15), [0, 1, 0, 0])
@@ -96,6 +91,17 @@ def test_picture_from_a_file(tmp_path: Path) -> None:
 POSE = "ra_deg = 1\ndec_deg = 2\n"
 SKY = f'kind = "sky"\n{POSE}'
 PICTURE = 'kind = "picture"\nfile = "x"\n'
+NIGHT = """
+kind = "sky"
+mount = "earth"
+ra_deg = 200
+dec_deg = -33.9
+[atmosphere]
+latitude_deg = -33.9
+sidereal_deg = 200
+seeing_arcsec = 3
+sky_mag = 19.5
+"""
 
 
 @pytest.mark.parametrize(
@@ -120,6 +126,20 @@ PICTURE = 'kind = "picture"\nfile = "x"\n'
         ('kind = "picture"\nfile = "none.png"', "none.png can not be read: No such file"),
         (f"{PICTURE}ra_deg = 1", "unknown key 'ra_deg'; allowed are file, crop"),
         ("kind =", "is not a TOML file"),
+        (NIGHT.replace("sidereal_deg = 200", ""), "atmosphere: needs either sidereal_deg, or utc"),
+        (NIGHT.replace("sidereal", "longitude"), "sidereal_deg, or utc and longitude_deg"),
+        (NIGHT.replace("latitude_deg = -33.9", ""), "atmosphere: needs the key latitude_deg"),
+        (NIGHT.replace('"earth"', '"earth"\nrate_deg_s = [0, 1, 0]'), 'mount = "earth" needs one'),
+        (NIGHT.replace('"earth"', '"moon"'), "mount must be one of sky, earth, not 'moon'"),
+        (
+            NIGHT.replace("sidereal_deg = 200", 'utc = "now"\nlongitude_deg = 0'),
+            "utc must be a date and time",
+        ),
+        (f"{SKY}[hazards.moo]", "hazards: unknown key 'moo'; allowed are moon, "),
+        (f"{SKY}[hazards.moon]\nphase = 1", "hazards: moon: unknown key 'phase'; allowed are "),
+        (f"{SKY}[hazards.moon]\nscatter = 2", "hazards: moon: scatter must be 0 to 0.2, not 2"),
+        (f"{SKY}[hazards.moon]\nsun = 2", "hazards: moon: sun must be a list, not 2"),
+        (f"{SKY}[hazards]\nmoon = 2", "hazards: moon must be a table, not 2"),
     ],
 )
 def test_errors_are_one_line(tmp_path: Path, text: str, complaint: str) -> None:
@@ -128,7 +148,7 @@ def test_errors_are_one_line(tmp_path: Path, text: str, complaint: str) -> None:
 
 
 def test_a_file_changes_the_device_s_lens_and_keeps_the_sensor(tmp_path: Path) -> None:
-    text = 'kind = "sky"\nra_deg = 84\ndec_deg = -1\n[optics]\npsf_sigma_px = 2.5\n'
+    text = f"{SKY}[optics]\npsf_sigma_px = 2.5\n"
     for usual in (CONDITION, SkyCondition(double_gauss())):
         view = load_scene(save(tmp_path, text), usual)
         assert view.condition == replace(usual, optics=replace(usual.optics, psf_sigma_px=2.5))
@@ -136,48 +156,13 @@ def test_a_file_changes_the_device_s_lens_and_keeps_the_sensor(tmp_path: Path) -
         load(save(tmp_path, text + "columns = 5\n"))
 
 
-NIGHT = """
-kind = "sky"
-mount = "earth"
-ra_deg = 200
-dec_deg = -33.9
-[atmosphere]
-latitude_deg = -33.9
-sidereal_deg = 200
-seeing_arcsec = 3
-sky_mag = 19.5
-"""
-
-
 def test_a_night_on_the_ground(tmp_path: Path) -> None:
     scene = load(save(tmp_path, NIGHT)).scene
-    assert isinstance(scene, SkyScene)
     assert scene.atmosphere == Atmosphere(-33.9, 200, seeing_arcsec=3, sky_mag=19.5)
     np.testing.assert_allclose(scene.rate_deg_s, earth_rate_deg_s(scene.quaternion))
     utc = NIGHT.replace("sidereal_deg = 200", "utc = 2013-06-01T20:00:00Z\nlongitude_deg = 18.9")
     dated = load(save(tmp_path, utc)).scene
-    assert isinstance(dated, SkyScene)
-    assert dated.atmosphere is not None
     assert dated.atmosphere.sidereal_deg == pytest.approx(209.4, abs=0.1)
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "wrong"),
-    [
-        (
-            "sidereal_deg = 200",
-            "",
-            "atmosphere: needs either sidereal_deg, or utc and longitude_deg",
-        ),
-        ("sidereal_deg", "longitude_deg", "atmosphere: needs either sidereal_deg, or utc"),
-        ("latitude_deg = -33.9", "", "atmosphere: needs the key latitude_deg"),
-        ('"earth"', '"earth"\nrate_deg_s = [0, 1, 0]', 'mount = "earth" needs one pose'),
-        ('"earth"', '"moon"', "mount must be one of sky, earth, not 'moon'"),
-        ("sidereal_deg = 200", 'utc = "now"\nlongitude_deg = 0', "utc must be a date and time"),
-    ],
-)
-def test_rejects_impossible_nights(tmp_path: Path, old: str, new: str, wrong: str) -> None:
-    check_refused(load, save(tmp_path, NIGHT.replace(old, new)), wrong)
 
 
 def test_a_pose_without_attitude_goes_on(tmp_path: Path) -> None:
@@ -199,7 +184,7 @@ def test_example_scenes_load(path: Path) -> None:
 
 def test_renders_with_the_calibrated_lens(tmp_path: Path) -> None:
     def drawn(seed: int, more: str = "") -> Optics:
-        text = f'kind = "sky"\nra_deg = 1\ndec_deg = 2\n[optics]\ndrawn = {seed}\n{more}'
+        text = f"{SKY}[optics]\ndrawn = {seed}\n{more}"
         return load_scene(save(tmp_path, text), CONDITION, UNCERTAIN).condition.optics
 
     lenses = [drawn(seed) for seed in range(40)]
@@ -209,14 +194,11 @@ def test_renders_with_the_calibrated_lens(tmp_path: Path) -> None:
         assert 0.6 < off.std() < 1.4
         assert abs(off.mean()) < 0.5
     assert drawn(3, "cx = 500.0") == replace(lenses[3], cx=500.0)
-    text = 'kind = "sky"\nra_deg = 1\ndec_deg = 2\n[optics]\ndrawn = 1'
-    check_refused(load, save(tmp_path, text), "optics: this lens has no uncertainties to draw from")
+    undrawn = save(tmp_path, f"{SKY}[optics]\ndrawn = 1")
+    check_refused(load, undrawn, "optics: this lens has no uncertainties to draw from")
 
 
-HAZARDS = """
-kind = "sky"
-ra_deg = 10
-dec_deg = 20
+HAZARDS = f"""{SKY}
 seed = 5
 [[hazards.moon]]
 direction = [10.0, 21.0]
@@ -230,25 +212,8 @@ seed = 6
 
 def test_hazards_go_to_scene_and_condition(tmp_path: Path) -> None:
     view = load(save(tmp_path, HAZARDS))
-    assert isinstance(view.scene, SkyScene)
     assert view.scene.hazards == (
         Moon(direction=(10.0, 21.0), seed=5),
         Moon(direction=(0.0, 0.0, -1.0), sun=(1.0, 0.0, 0.0), seed=6),
     )
     assert [(hazard.name, hazard.seed) for hazard in view.condition.hazards] == [("hot-pixels", 5)]
-
-
-@pytest.mark.parametrize(
-    ("table", "message"),
-    [
-        ("[hazards.moo]", "hazards: unknown key 'moo'; allowed are moon, "),
-        ("[hazards.moon]\nphase = 1", "hazards: moon: unknown key 'phase'; allowed are "),
-        ("[hazards.moon]\nscatter = 2", "hazards: moon: scatter must be 0 to 0.2, not 2"),
-        ("[hazards.moon]\nsun = 2", "hazards: moon: sun must be a list, not 2"),
-        ("[hazards]\nmoon = 2", "hazards: moon must be a table, not 2"),
-    ],
-)
-def test_refuses_wrong_hazards(tmp_path: Path, table: str, message: str) -> None:
-    path = save(tmp_path, 'kind = "sky"\nra_deg = 1\ndec_deg = 1\n' + table)
-    with pytest.raises(SceneError, match=re.escape(message)):
-        load(path)

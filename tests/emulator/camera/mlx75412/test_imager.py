@@ -1,5 +1,4 @@
 from dataclasses import replace
-from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -11,8 +10,8 @@ from cubestack.emulator.camera.common.view import SkyCondition
 from cubestack.emulator.camera.mlx75412 import imager as chip
 from cubestack.emulator.camera.mlx75412.lens import CONDITION, LENS
 from cubestack.emulator.scene.sky import PictureScene, SkyScene
+from tests.emulator.scene.hazards.around import SHUTTER as LONG
 
-LONG = RollingShutter(10**12, Fraction(132_200_000), 2917, 2917)
 ORION = replace(SkyScene.pointing(83.8, -1.0), mag_limit=3.8)
 RAW = chip.Corrections(defects=False, fixed_pattern=False, dark=False)
 BITS = chip.DN12_PER_DN8 * chip.ELECTRONS_PER_DN12  # electrons per count of 8 bits
@@ -74,9 +73,8 @@ def test_normal_noise_is_near_the_sum_of_poisson_and_normal() -> None:
     mean = 2 * chip.READ_NOISE_ELECTRONS**2
     counts = frame(flat(mean), chip.Corrections(), exposure_s=0.0)
     generator = np.random.default_rng(3)
-    exact = generator.poisson(mean, 500_000) + generator.normal(
-        0, chip.READ_NOISE_ELECTRONS, 500_000
-    )
+    exact = generator.poisson(mean, 500_000).astype(float)
+    exact += generator.normal(0, chip.READ_NOISE_ELECTRONS, 500_000)
     reference = chip.ideal_counts(exact.astype(np.float32)).astype(float)
     for level in range(4, 12):
         assert np.mean(counts >= level) == pytest.approx(np.mean(reference >= level), abs=0.01)

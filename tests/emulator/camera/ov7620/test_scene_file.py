@@ -62,17 +62,10 @@ def test_example_in_the_documentation_is_a_scene(tmp_path: Path) -> None:
 
 
 def test_a_lens_from_a_file(tmp_path: Path) -> None:
-    text = f"{KIND}[sun_lens]\ncentre_px = [1, -2]\nradial_deg = [[40, 0.5], [60.0, 1]]"
+    text = f"{LENS}centre_px = [1, -2]\nradial_deg = [[40, 0.5], [60.0, 1]]"
     condition = load_earth_sun_scene(save(tmp_path, text)).condition
     assert condition.sun_lens == LensError((1.0, -2.0), ((40.0, 0.5), (60.0, 1.0)))
     assert condition.nadir_lens is None
-    for wrong, complaint in [
-        ("radial_deg = 3", "sun_lens: radial_deg must be a list, not 3"),
-        ("radial_deg = [[1]]", "sun_lens: radial_deg must be a list of 2 numbers"),
-        ("radial_deg = [[99, 1]]", "sun_lens: radial_deg must have rising field angles"),
-        ("colour = 1", "unknown key 'colour'; allowed are centre_px"),
-    ]:
-        check_refused(load_earth_sun_scene, save(tmp_path, f"{KIND}[sun_lens]\n{wrong}"), complaint)
 
 
 def test_shortest_file(tmp_path: Path) -> None:
@@ -83,6 +76,8 @@ def test_shortest_file(tmp_path: Path) -> None:
 
 
 KIND = 'kind = "earth-sun"\n'
+LENS = f"{KIND}[sun_lens]\n"
+BALL = 'kind = "ball"\n'
 DISC = f'{KIND}[[reflections]]\ncamera = "sun"\nradius_px = 1\n'
 
 
@@ -100,6 +95,13 @@ DISC = f'{KIND}[[reflections]]\ncamera = "sun"\nradius_px = 1\n'
         (f"{KIND}[sun_camera]\nup = 1", "sun_camera: unknown key 'up'; allowed are boresight"),
         (f'{KIND}[[reflections]]\ncamera = "sun"', "needs the keys radius_px, level, at_"),
         (f"{DISC}at_deg = [90, 90]\nlevel = 1", "within 95.0 deg of the boresight, not 90.0, 90.0"),
+        (f"{LENS}radial_deg = 3", "sun_lens: radial_deg must be a list, not 3"),
+        (f"{LENS}radial_deg = [[1]]", "sun_lens: radial_deg must be a list of 2 numbers"),
+        (f"{LENS}radial_deg = [[99, 1]]", "sun_lens: radial_deg must have rising field angles"),
+        (f"{LENS}colour = 1", "unknown key 'colour'; allowed are centre_px"),
+        (f"{BALL}radius_mm = 0", "radius_mm must be above 0 mm, not 0"),
+        (f"{BALL}offset_mm = [0, 0, 40]", "offset_mm must leave the camera outside the ball"),
+        (f"{BALL}nadir = [0, 0, 1]", "unknown key 'nadir'; allowed are angle_deg"),
     ],
 )
 def test_errors_are_one_line(tmp_path: Path, text: str, complaint: str) -> None:
@@ -107,19 +109,13 @@ def test_errors_are_one_line(tmp_path: Path, text: str, complaint: str) -> None:
 
 
 def test_the_ball_of_the_bench(tmp_path: Path) -> None:
-    text = 'kind = "ball"\nangle_deg = [20, -10]\nseed = 4\nnoise = false\n[nadir_lens]\n'
+    text = f"{BALL}angle_deg = [20, -10]\nseed = 4\nnoise = false\n[nadir_lens]\n"
     view = load_earth_sun_scene(save(tmp_path, text + "centre_px = [1, 0]"))
     truth = view.scene.truth(CameraTarget.NADIR, 0)
     assert (truth.alpha_deg, truth.beta_deg) == pytest.approx((20, -10))
     assert view.scene.altitude_km == pytest.approx(748.4, abs=0.1)
     assert view.condition.nadir_lens == LensError(centre_px=(1.0, 0.0))
     assert (view.condition.noise, view.condition.seed, view.scene.seed) == (False, 4, 4)
-    for wrong, complaint in (
-        ("radius_mm = 0", "radius_mm must be above 0 mm, not 0"),
-        ("offset_mm = [0, 0, 40]", "offset_mm must leave the camera outside the ball"),
-        ("nadir = [0, 0, 1]", "unknown key 'nadir'; allowed are angle_deg"),
-    ):
-        check_refused(load_earth_sun_scene, save(tmp_path, f'kind = "ball"\n{wrong}'), complaint)
 
 
 def test_hazards_go_to_scene_or_cameras(tmp_path: Path) -> None:
@@ -133,9 +129,7 @@ def test_hazards_go_to_scene_or_cameras(tmp_path: Path) -> None:
     seed = 9
     [hazards.gradient]
     """
-    path = tmp_path / "scene.toml"
-    path.write_text(text)
-    view = load_earth_sun_scene(path)
+    view = load_earth_sun_scene(save(tmp_path, text))
     light, sensor = view.scene.hazards, view.condition.hazards
     assert light == (Terminator(phase_deg=110.0, seed=5), Clouds(contrast=0.5, seed=9))
     assert [hazard.name for hazard in sensor] == ["gradient"]

@@ -1,5 +1,3 @@
-"""The library cache: built once, never trusted blindly, and what happens without a compiler."""
-
 import subprocess
 import sys
 from dataclasses import replace

@@ -1,5 +1,3 @@
-"""Evaluations taken apart by clock: what is left out, and when nothing may be."""
-
 import re
 
 import pytest
@@ -144,7 +142,6 @@ def test_the_header_has_the_link_clock_detected_and_the_state_copied(rtlil):
     header = pins_header(WIRING, design, [variant_text(rtlil, FIRST)])
     assert "#define VARIANTS VARIANT(0)\n" in header
     whole = re.search(r"derived_edge\(const cxxrtl_design::p_top &top\) \{.*\}", header)
-    assert whole is not None
     assert whole[0].count("posedge") == 2
     assert "return false" in header.partition("variant_0::p_top &top")[2]
     assert re.search(r"to\.p_sun\w*search\w*_x\.curr = from\.p_sun\w*search\w*_x\.curr;", header)

@@ -24,7 +24,6 @@ def whole_light(hazard: SkyHazard, now: CameraState, centre: np.ndarray, reach_r
     across = np.cos(around)[:, None] * side + np.sin(around)[:, None] * np.cross(centre, side)
     vectors = cosine[:, None, None] * centre + sine[:, None, None] * across
     glow = hazard.glow(now, vectors.reshape(-1, 3))
-    assert glow is not None
     area = 2 * math.pi * (1 - math.cos(reach_rad))
     return float(glow.mean(dtype=np.float64)) * area
 

@@ -1,5 +1,3 @@
-"""Directions that scenes name, where hazards are placed, and what all hazards have."""
-
 from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar
 

@@ -1,5 +1,3 @@
-"""Light that comes about in the lens or on the satellite: ghosts and glint."""
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,6 @@
 import inspect
 import time
 from dataclasses import replace
-from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -10,7 +9,6 @@ from cubestack.emulator.camera.common.hazards import HAZARDS, Background, Dose, 
 from cubestack.emulator.camera.common.hazards.contract import SensorHazard
 from cubestack.emulator.camera.common.hazards.pixels import Response
 from cubestack.emulator.camera.common.register_file import RegisterFile
-from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.mlx75412 import lens as cubestar
 from cubestack.emulator.camera.mlx75412.imager import Corrections, Mlx75412Imager
 from cubestack.emulator.camera.mt9m001 import lens as aramis
@@ -19,9 +17,8 @@ from cubestack.emulator.camera.mt9m001.registers import read_settings
 from cubestack.emulator.scene.file import SceneError
 from cubestack.emulator.scene.sky import PictureScene, SkyScene
 from cubestack.firmware_model.interface.cameras.mt9m001 import REGISTERS
+from tests.emulator.scene.hazards.around import ORION, SHUTTER
 
-SHUTTER = RollingShutter(10**12, Fraction(132_200_000), 2917, 2917)
-ORION = SkyScene.pointing(83.8, -1.0)
 DARK = replace(ORION, mag_limit=-5.0)
 CAMERAS = ("cubestar", "aramis")
 
@@ -166,9 +163,7 @@ SHAPE = (512, 1024)
 
 
 def gain(hazard: Response) -> np.ndarray:
-    field = hazard.response(SHAPE)
-    assert field is not None
-    return field
+    return hazard.response(SHAPE)
 
 
 def test_response_differs_as_declared() -> None:

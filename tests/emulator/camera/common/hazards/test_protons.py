@@ -7,10 +7,11 @@ import pytest
 
 from cubestack.emulator.camera.common.dark import dark_at, hot_pixels
 from cubestack.emulator.camera.common.hazards import protons
-from cubestack.emulator.camera.common.hazards.contract import Exposure
+from cubestack.emulator.camera.common.hazards.contract import Exposure, SensorHazard
 from cubestack.emulator.camera.common.hazards.dose import Dose
 
 CUBESTAR = Exposure((512, 1024), 5.6, 0.3856, 20.0, 36.48)
+WARM = replace(CUBESTAR, temperature_c=27.0)
 ONE = np.ones(1)
 
 
@@ -18,7 +19,7 @@ def drawn(seed: int) -> np.random.Generator:
     return np.random.default_rng(seed)
 
 
-def charge(hazard: protons.Protons, seed: int = 0, exposure: Exposure = CUBESTAR) -> np.ndarray:
+def charge(hazard: SensorHazard, seed: int = 0, exposure: Exposure = CUBESTAR) -> np.ndarray:
     image = hazard.charge(exposure, drawn(seed))
     return np.zeros(exposure.shape, np.float32) if image is None else image
 
@@ -111,40 +112,28 @@ def test_tracks_repeat_per_frame_and_differ_between_frames() -> None:
     assert protons.Protons(hits=0).charge(CUBESTAR, drawn(0)) is None
 
 
-WARM = Exposure((512, 1024), 5.6, 0.3856, 27.0, 36.48)
-
-
-def dose_charge(hazard: Dose, exposure: Exposure = WARM, seed: int = 0) -> np.ndarray:
-    image = hazard.charge(exposure, np.random.default_rng(seed))
-    assert image is not None
-    return image
-
-
 def test_mean_dark_current_is_that_of_the_universal_damage_factor() -> None:
     # Srour and Lo: (1.9 +- 0.6)e5 / (cm3 s) for each MeV/g at 300 K. 1 krad has 2.5e6 MeV/g here.
     volume_cm3 = 5.6e-4**2 * 3e-4
     expected = 1.9e5 * 2.5e6 * volume_cm3
-    mean = dose_charge(Dose(krad=1.0)).mean() / WARM.seconds
+    mean = charge(Dose(krad=1.0), exposure=WARM).mean() / WARM.seconds
     assert expected * 1.3 / 1.9 < mean < expected * 2.5 / 1.9
 
 
 def test_dose_sets_the_count_and_temperature_the_strength() -> None:
-    small, large = dose_charge(Dose(krad=0.1)), dose_charge(Dose(krad=1.0))
+    small, large = (charge(Dose(krad=krad), exposure=WARM) for krad in (0.1, 1.0))
     assert np.sum(large > 0) == pytest.approx(10 * np.sum(small > 0), rel=0.1)
     assert large[large > 0].mean() == pytest.approx(small[small > 0].mean(), rel=0.1)
-    hotter = dose_charge(Dose(krad=1.0), replace(WARM, temperature_c=35.0))
+    hotter = charge(Dose(krad=1.0), exposure=replace(WARM, temperature_c=35.0))
     np.testing.assert_allclose(hotter, 2 * large, rtol=1e-5)
+    assert not Dose(krad=0.0).charge(WARM, drawn(0)).any()
+    assert Dose(krad=0.0).dark_rise() == 1
 
 
 def test_places_are_the_sensor_s_in_every_frame() -> None:
-    first = dose_charge(Dose(krad=1.0, seed=4), seed=1)
-    np.testing.assert_array_equal(first, dose_charge(Dose(krad=1.0, seed=4), seed=2))
-    assert np.any(first != dose_charge(Dose(krad=1.0, seed=5), seed=1))
-
-
-def test_zero_dose_causes_no_damage() -> None:
-    assert not dose_charge(Dose(krad=0.0)).any()
-    assert Dose(krad=0.0).dark_rise() == 1
+    first = charge(Dose(krad=1.0, seed=4), seed=1)
+    np.testing.assert_array_equal(first, charge(Dose(krad=1.0, seed=4), seed=2))
+    assert np.any(first != charge(Dose(krad=1.0, seed=5), seed=1))
 
 
 @pytest.mark.parametrize(
