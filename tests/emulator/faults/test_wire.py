@@ -73,14 +73,11 @@ def test_bytes_that_begin_in_time_are_hit(fault: Any, change: Change, direction:
     assert len(line.log) == 4 * (2 if direction == "both" else 1)
 
 
-def test_bytes_after_a_delayed_one_are_delayed_too() -> None:
+def test_bytes_after_a_delayed_one_are_delayed_too_and_delays_do_not_add_up() -> None:
     line = Line()
     line.inject(UartDelay(delay_ms=2.5), 3, 3.5)
     expected = [(time if time < 4 else max(time, byte + 3.5), byte) for time, byte in CLEAN]
     assert line.both() == (expected, expected)
-
-
-def test_delays_do_not_add_up() -> None:
     line = Line()
     line.inject(UartDelay(delay_ms=2.0))
     expected = [(time + 2, byte) for time, byte in CLEAN]

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -110,12 +111,7 @@ def engines(wiring: Wiring, timing: SramTiming | None = None) -> list[RtlEngine]
     """One of each sort; the last is the reference."""
     return [
         make_engine(wiring, kind, timing, skipping=skipping)
-        for kind, skipping in (
-            ("compiled", True),
-            ("compiled", False),
-            ("python", True),
-            ("python", False),
-        )
+        for kind, skipping in product(("compiled", "python"), (True, False))
     ]
 
 

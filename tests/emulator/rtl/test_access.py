@@ -105,7 +105,6 @@ def test_every_engine_makes_the_same_transactions(design) -> None:
 @needs_compiler
 def test_a_bulk_read_of_full_size_is_the_read_pin_by_pin() -> None:
     """Beside a picture that is stored in the other memory, at every engine's own speed."""
-    rng = np.random.default_rng(3)
     wiring = cubestar_double_wiring()
     found = []
     for bulk in (True, False):

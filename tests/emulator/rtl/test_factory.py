@@ -61,9 +61,6 @@ def test_reports_failed_compiler(engines: dict[str, Any]) -> None:
         make("auto")
 
 
-WIRING: Any = None  #: Nobody looks at it here
-
-
 def test_the_first_build_alone_is_timed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Not how long it took to elaborate the design."""
     clock, compiler = SimpleNamespace(now_s=100.0), object()
@@ -80,10 +77,10 @@ def test_the_first_build_alone_is_timed(monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.setattr(benchmark, "time", SimpleNamespace(perf_counter=lambda: clock.now_s))
     monkeypatch.setattr(benchmark, "find_compiler", lambda: compiler)
     monkeypatch.setattr(benchmark, "library_for", library_for)
-    assert benchmark.cold_build_s(WIRING) == 2.5
+    assert benchmark.cold_build_s(None) == 2.5
 
 
 def test_without_a_compiler_there_is_no_build_to_time(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(benchmark, "find_compiler", lambda: None)
     with pytest.raises(NoCompilerError, match="no C\\+\\+ compiler to measure"):
-        benchmark.cold_build_s(WIRING)
+        benchmark.cold_build_s(None)

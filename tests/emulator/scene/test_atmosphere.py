@@ -32,9 +32,8 @@ def seen(air: Atmosphere, stars: Vectors, exposure_s: float = 0.4, seed: int = 1
 def test_air_mass_and_refraction_are_those_of_the_tables() -> None:
     # Kasten and Young, table II; Bennett's and Saemundsson's refraction at true heights.
     heights = np.array([90, 60, 30, 10, 0.0])
-    np.testing.assert_allclose(
-        air_mass(heights), [0.99971, 1.1539, 1.9939, 5.5841, 37.92], rtol=1e-3
-    )
+    masses = [0.99971, 1.1539, 1.9939, 5.5841, 37.92]
+    np.testing.assert_allclose(air_mass(heights), masses, rtol=1e-3)
     arcmin = np.degrees(refraction_rad(heights)) * 60
     np.testing.assert_allclose(arcmin, [0.0, 0.58, 1.73, 5.4, 28.9], atol=0.15)
 
@@ -66,9 +65,8 @@ def test_stars_twinkle_as_youngs_formula_says() -> None:
         light = seen(air, stars, exposure_s)[1].reshape(2, -1)
         zenith = 0.09 * 6 ** (-2 / 3) / np.sqrt(2 * exposure_s)
         np.testing.assert_allclose(light.mean(axis=1), 1, atol=5e-3)
-        np.testing.assert_allclose(
-            light.std(axis=1), zenith * air_mass(np.array([90, 40])) ** 1.75, rtol=0.03
-        )
+        expected = zenith * air_mass(np.array([90, 40])) ** 1.75
+        np.testing.assert_allclose(light.std(axis=1), expected, rtol=0.03)
 
 
 def test_images_move_by_the_seeing_and_less_in_longer_exposures() -> None:

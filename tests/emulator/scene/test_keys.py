@@ -14,6 +14,8 @@ from cubestack.emulator.camera.ov7620.scene_file import earth_sun_keys, load_ear
 from cubestack.emulator.scene.file import SceneError, toml_text
 from cubestack.emulator.scene.hazards import EARTH_HAZARDS, SKY_HAZARDS
 
+from ..camera.conftest import save
+
 KINDS = {**sky_keys(CONDITION, UNCERTAIN), **earth_sun_keys()}
 BASE: dict[str, dict[str, Any]] = {
     "sky": {"ra_deg": 1.0, "dec_deg": 2.0},
@@ -34,8 +36,7 @@ Within = Callable[[Any], dict[str, Any]]
 
 
 def load(folder: Path, kind: str, table: dict[str, Any]) -> Any:
-    path = folder / "scene.toml"
-    path.write_text(toml_text({"kind": kind, **BASE[kind], **table}), "utf-8")
+    path = save(folder, toml_text({"kind": kind, **BASE[kind], **table}))
     return load_scene(path, CONDITION, UNCERTAIN) if kind == "sky" else load_earth_sun_scene(path)
 
 
@@ -142,10 +143,8 @@ def test_every_key_has_a_meaning_and_a_type() -> None:
     for kind, keys in KINDS.items():
         for name, key, _ in every(keys):
             assert key["meaning"], f"{kind}: {name}"
-            assert key["type"] in (
-                *("number", "whole", "flag", "text", "moment", "choice"),
-                *("list", "table", "tables", "kinds"),
-            )
+            types = "number whole flag text moment choice list table tables kinds"
+            assert key["type"] in types.split()
     assert set(KINDS["sky"]["hazards"]["kinds"]) >= set(SKY_HAZARDS)
     assert set(KINDS["earth-sun"]["hazards"]["kinds"]) >= {*SKY_HAZARDS, *EARTH_HAZARDS}
     assert not set(SKY_HAZARDS) & set(KINDS["picture"]["hazards"]["kinds"])

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from cubestack.emulator.scene.attitude import matrix_from_quaternion, quaternion_from_pointing
-from cubestack.emulator.scene.file import SceneError
 from cubestack.emulator.scene.orbit import Inertial, NadirPointing, Waypoints
 from cubestack.emulator.scene.orbit_file import load_orbit
 
+from ..camera.conftest import check_refused, save
 from .test_orbit import VALLADO
 
 START = "start = 2026-11-24T12:00:00Z\n"
@@ -16,9 +16,7 @@ TLE = f"tle = [{VALLADO[0]!r}, {VALLADO[1]!r}]\n"
 
 
 def load(folder: Path, text: str):
-    path = folder / "orbit.toml"
-    path.write_text(text)
-    return load_orbit(path)
+    return load_orbit(save(folder, text))
 
 
 def test_the_least_that_there_must_be(tmp_path: Path) -> None:
@@ -75,10 +73,5 @@ def test_each_attitude(tmp_path: Path) -> None:
     ],
 )
 def test_errors_are_one_line(tmp_path: Path, text: str, complaint: str) -> None:
-    with pytest.raises(SceneError) as caught:
-        load(tmp_path, text)
-    assert str(caught.value).startswith(str(tmp_path / "orbit.toml"))
-    assert complaint in str(caught.value)
-    assert "\n" not in str(caught.value)
-    with pytest.raises(SceneError, match="can not be read"):
-        load_orbit(tmp_path / "none.toml")
+    check_refused(load_orbit, save(tmp_path, text), complaint)
+    check_refused(load_orbit, tmp_path / "none.toml", "can not be read")

@@ -1,6 +1,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 import pytest
@@ -49,9 +50,9 @@ class Lines:
 class Bench:
     """A camera whose frame has just ended, by default."""
 
-    def __init__(self, phase: int = ROWS * LINE) -> None:
+    def __init__(self, lines: Any = None) -> None:
         self.kernel = Kernel()
-        self.lines = Lines(phase)
+        self.lines = lines or Lines(ROWS * LINE)
         self.ppi = Ppi(self.kernel, self.lines)
         self.ends: list[tuple[int, FrameEnd]] = []
         self.ppi.on_end = lambda end: self.ends.append((self.kernel.now, end))
@@ -63,7 +64,7 @@ class Bench:
 
 
 def test_skips_the_frame_in_progress_and_stores_the_next() -> None:
-    bench = Bench(phase=5)
+    bench = Bench(Lines(5))
     bench.ppi.start(bench.target)
     assert bench.ppi.busy
     stored_ps = (FRAME - 5 + (ROWS - 1) * LINE + COLUMNS) * PERIOD
@@ -133,28 +134,24 @@ def test_unrelated_change_does_not_disturb_the_frame() -> None:
 
 @pytest.mark.parametrize("start_ms", [0, 40, 66])
 def test_the_sensor_s_frame_ends_when_its_last_pixel_comes(start_ms: int) -> None:
-    kernel, sky = Kernel(), SkyScene([0, 0, 0, 1], mag_limit=3.0)
-    ppi = Ppi(kernel, Mt9m001(sky, condition=replace(CONDITION, noise=False)))
-    ends: list[tuple[int, FrameEnd]] = []
-    ppi.on_end = lambda end: ends.append((kernel.now, end))
+    sky = SkyScene([0, 0, 0, 1], mag_limit=3.0)
+    bench = Bench(Mt9m001(sky, condition=replace(CONDITION, noise=False)))
     target = np.zeros((1024, 1280), np.uint8)
-    kernel.advance_to(start_ms * PS_PER_MS)
-    ppi.start(target)
-    kernel.advance_to(200 * PS_PER_MS)
+    bench.kernel.advance_to(start_ms * PS_PER_MS)
+    bench.ppi.start(target)
+    bench.kernel.advance_to(200 * PS_PER_MS)
     starts_s = (1 if start_ms < 33 else 2) * 1050 * 1524 / 48e6 + 242 / 48e6
     ends_s = starts_s + (1023 * 1524 + 1280) / 48e6
-    assert ends == [(pytest.approx(ends_s * PS_PER_S, abs=2), FrameEnd.STORED)]
-    assert ppi.stored.readout_ps == pytest.approx(starts_s * PS_PER_S)
+    assert bench.ends == [(pytest.approx(ends_s * PS_PER_S, abs=2), FrameEnd.STORED)]
+    assert bench.ppi.stored.readout_ps == pytest.approx(starts_s * PS_PER_S)
     assert target.min() > 0
 
 
 @pytest.mark.parametrize("wrong", range(ROWS))
 def test_wrong_line_spoils_only_its_own_frame(wrong: int) -> None:
     """One piece of a frame has lines of another length; the frame then starts again."""
-    bench = Bench()
     lines = Pieces(wrong)
-    bench.ppi = Ppi(bench.kernel, lines)
-    bench.ppi.on_end = lambda end: bench.ends.append((bench.kernel.now, end))
+    bench = Bench(lines)
     bench.ppi.start(bench.target)
     assert [end for _, end in bench.run(FRAME)] == [FrameEnd.WRONG_LINES]
     lines.wrong = None

@@ -6,12 +6,7 @@ from cubestack.emulator.boards.aramis.catalogue import CatalogueParameters, buil
 from cubestack.emulator.scene.attitude import attitude_error_deg
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.interface import aramis as codes
-from cubestack.firmware_model.interface.aramis import (
-    CatalogueState,
-    LatchUpStep,
-    MeasurementOutcome,
-    Reason,
-)
+from cubestack.firmware_model.interface.aramis import CatalogueState, LatchUpStep, Reason
 
 from .conftest import ORION, Desk
 
@@ -160,7 +155,7 @@ def test_double_error_is_reported_and_yields_no_attitude(desk: Desk) -> None:
     desk.flip_flash(4321, 7, 50)
     assert desk.aramis.activate() is CatalogueState.DAMAGED
     found = desk.aramis.measure()
-    expected = False, MeasurementOutcome.NONE, Reason.CATALOGUE_DAMAGED
+    expected = False, codes.MeasurementOutcome.NONE, Reason.CATALOGUE_DAMAGED
     assert (found.valid, found.outcome, found.reason) == expected
     assert desk.client.telemetry("CatalogueStatus")["Lost"] == 1
     assert "CatalogueDamaged" in desk.flags()

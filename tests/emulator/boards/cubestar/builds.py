@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from cubestack.emulator.native.compiler import find_compiler
 from cubestack.host.devices.registry import device
 from cubestack.host.export.processor import processor_header
 
@@ -15,6 +16,10 @@ PART = ("-mcpu=cortex-m3", "-mthumb", "-ffreestanding", "-nostdlib")
 FLAGS = (*PART, "-O2", "-g", "-Wall", "-Werror")
 
 needs_toolchain = pytest.mark.skipif(COMPILER is None, reason="needs gcc-arm-none-eabi")
+needs_both_compilers = [
+    needs_toolchain,
+    pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler"),
+]
 
 
 def build(name: str, folder: Path) -> Path:

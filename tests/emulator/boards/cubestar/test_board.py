@@ -77,9 +77,8 @@ def test_pixels_sent_before_power_loss_are_stored(monkeypatch: pytest.MonkeyPatc
         yield SetPin("ENABLE", 1)
         yield Sleep(None)
 
-    monkeypatch.setattr(
-        cubestar, "CubeStarProgram", lambda *_hardware: SimpleNamespace(main=storing)
-    )
+    program = SimpleNamespace(main=storing)
+    monkeypatch.setattr(cubestar, "CubeStarProgram", lambda *_hardware: program)
     dark = SkyScene([0, 0, 0, 1], mag_limit=-2)
     board = cubestar.CubeStarBoard(dark, None, layout=Layout.SHARED)  # type: ignore[arg-type]
     board.kernel.advance_to(40 * PS_PER_MS)

@@ -16,17 +16,13 @@ from cubestack.emulator.boards.debugging import open_debugger
 from cubestack.emulator.iss.gdb.packets import framed
 from cubestack.emulator.iss.gdb.session import Session
 from cubestack.emulator.iss.image import Image, load_image
-from cubestack.emulator.native.compiler import find_compiler
 from cubestack.emulator.ports.gdb import GdbEndpoint
 from cubestack.emulator.recording.trace import VcdTrace
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S
-from tests.emulator.boards.cubestar.builds import build, needs_toolchain
+from tests.emulator.boards.cubestar.builds import build, needs_both_compilers
 
-pytestmark = [
-    needs_toolchain,
-    pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler"),
-]
+pytestmark = needs_both_compilers
 
 GDB = shutil.which("gdb-multiarch")
 needs_gdb = pytest.mark.skipif(GDB is None, reason="needs gdb-multiarch")

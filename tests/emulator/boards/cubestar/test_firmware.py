@@ -6,19 +6,15 @@ import pytest
 from cubestack.emulator.boards.cubestar.firmware import CubeStarFirmwareBoard
 from cubestack.emulator.iss.image import Image, load_image
 from cubestack.emulator.iss.outcome import Outgoing, OutgoingKind
-from cubestack.emulator.native.compiler import find_compiler
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S
 from cubestack.firmware_model.interface.cameras.mlx75412 import REGISTERS
 from cubestack.firmware_model.interface.cubestar import processor_pins as wired
 from cubestack.firmware_model.interface.cubestar.pins import Layout
 from cubestack.firmware_model.interface.efm32gg.pins import pin_number
-from tests.emulator.boards.cubestar.builds import build, needs_toolchain
+from tests.emulator.boards.cubestar.builds import build, needs_both_compilers
 
-pytestmark = [
-    needs_toolchain,
-    pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler"),
-]
+pytestmark = needs_both_compilers
 
 RESULTS = 0x1_0000  #: Where the programs leave their results, in RAM
 
@@ -112,9 +108,8 @@ def test_floating_switch_pin_is_pulled_up(images: dict[str, Image], level: int, 
         board.power.switch(channel, not on)
         board._pin(Outgoing(OutgoingKind.PIN, pin_number(pin), level, 0, board.kernel.now))
         assert board.power.is_on(channel) is on
-    board._pin(
-        Outgoing(OutgoingKind.PIN, pin_number(wired.CAMERA_RESET), level, 0, board.kernel.now)
-    )
+    reset = pin_number(wired.CAMERA_RESET)
+    board._pin(Outgoing(OutgoingKind.PIN, reset, level, 0, board.kernel.now))
     assert board.camera.running is (on and board.power.is_on("imager"))
     board.close()
 

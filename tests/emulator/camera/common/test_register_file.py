@@ -38,13 +38,9 @@ def test_register_at_once_and_register_with_sync(registers: RegisterFile) -> Non
     assert registers.active("RATE") == 0xABCD
     registers.reset()
     assert (registers.active("MODE"), registers.active("RATE")) == (1, 0x0203)
-
-
-def test_stored_by_the_camera(registers: RegisterFile) -> None:
-    registers.store("RATE", 0x1234)
-    assert registers.active("RATE") == 0x1234
+    registers.store("RATE", 0x1234)  # by the camera: at once
     registers.select(0x11)
-    assert registers.read() == 0x12
+    assert (registers.active("RATE"), registers.read()) == (0x1234, 0x12)
 
 
 @pytest.mark.parametrize(

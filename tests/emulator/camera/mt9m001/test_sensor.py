@@ -231,9 +231,7 @@ def test_gain_multiplies_and_can_differ_by_rows_and_columns() -> None:
 
 
 def test_frames_repeat_with_the_same_seed_and_differ_in_time() -> None:
-    one, two, other = (
-        Mt9m001(scene(), condition=replace(CONDITION, seed=seed)) for seed in (5, 5, 6)
-    )
+    one, two, other = (Mt9m001(scene(), condition=replace(CONDITION, seed=n)) for n in (5, 5, 6))
     np.testing.assert_array_equal(frame(one, 0), frame(two, 0))
     assert (frame(one, 0) != frame(one, PS_PER_S)).any()
     assert (frame(one, 0) != frame(other, 0)).any()

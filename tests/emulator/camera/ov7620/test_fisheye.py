@@ -98,9 +98,8 @@ def test_pixel_angle_is_that_between_neighbours() -> None:
     lens = fisheye.LENSES[CameraTarget.NADIR]
     field = lens.field
     for x, y in [(380, 240), (471, 336), (371, 36), (160, 236)]:
-        here, right, down = lens.unproject(
-            [[x - 0.5, y - 0.5], [x + 0.5, y - 0.5], [x - 0.5, y + 0.5]]
-        )
+        corners = np.array([[x, y], [x + 1, y], [x, y + 1]]) - 0.5
+        here, right, down = lens.unproject(corners)
         area = np.linalg.norm(np.cross(right - here, down - here))
         at = np.searchsorted(field.index, y * 640 + x)
         assert field.pixel_rad[at] == pytest.approx(np.sqrt(area), rel=0.02)

@@ -96,9 +96,8 @@ def test_protons_leave_other_tracks_in_each_frame_and_camera() -> None:
 
 
 def test_hot_pixels_are_stuck_as_those_of_the_key() -> None:
-    np.testing.assert_array_equal(
-        grey(HotPixels(count=50), scene=DARK, hot_pixels=9), grey(scene=DARK, hot_pixels=59)
-    )
+    stuck = grey(HotPixels(count=50), scene=DARK, hot_pixels=9)
+    np.testing.assert_array_equal(stuck, grey(scene=DARK, hot_pixels=59))
     with pytest.raises(SceneError, match="hot_pixels and hot_pairs must be at most 76800 together"):
         FisheyeCondition(hazards=(HotPixels(count=75_000),), hot_pairs=1801)
 
@@ -106,10 +105,8 @@ def test_hot_pixels_are_stuck_as_those_of_the_key() -> None:
 def test_each_camera_has_a_draw_of_its_own() -> None:
     slopes = [grey(Gradient(seed=6), scene=DARK, which=which) for which in CameraTarget]
     assert np.abs(slopes[0] - slopes[1]).max() > 5
-    residuals = [
-        camera(LensResiduals(seed=6), which=which).lens.residuals for which in CameraTarget
-    ]
-    assert residuals[0] != residuals[1]
+    sun, nadir = (camera(LensResiduals(seed=6), which=which).lens for which in CameraTarget)
+    assert sun.residuals != nadir.residuals
 
 
 def test_a_longer_lens_moves_the_sun_away_from_the_boresight() -> None:
@@ -124,9 +121,7 @@ def test_a_longer_lens_moves_the_sun_away_from_the_boresight() -> None:
 
 def test_a_longer_lens_has_a_longer_rim() -> None:
     lens = camera(FocalLength(percent=3.0)).lens
-    lit = [
-        np.count_nonzero(lens_of(CameraTarget.NADIR, which).field.lit) for which in (NOMINAL, lens)
-    ]
+    lit = [np.count_nonzero(lens_of(CameraTarget.NADIR, own).field.lit) for own in (NOMINAL, lens)]
     # All but what is cut off at the top and bottom edge.
     assert 1.02 < lit[1] / lit[0] < 1.03**2
 

@@ -5,7 +5,7 @@ import pytest
 
 from cubestack.emulator.camera.ov7620.sccb import SccbSlave
 
-from .sccb_master import US, send
+from ..conftest import US, send
 
 
 class Device:

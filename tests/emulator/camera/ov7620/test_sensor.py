@@ -12,8 +12,7 @@ from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
 from cubestack.emulator.scene.earth_sun import CameraTarget, EarthSunScene, Reflection
 from cubestack.firmware_model.interface.cameras.ov7620 import REGISTERS, window_column, window_row
 
-from ..conftest import segments
-from .sccb_master import US, send
+from ..conftest import US, segments, send
 
 MS = 10**9
 LINE_PS = Fraction(858 * 10**6, Fraction(27, 2))

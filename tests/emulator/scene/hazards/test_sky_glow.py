@@ -43,9 +43,8 @@ def test_zodiacal_light_by_the_other_table() -> None:
     """Both tables are rounded, to three digits at most."""
     s10 = np.array([line.replace("-", "nan").split() for line in TABLE_16.splitlines()], float)
     s10 = np.column_stack([s10, np.full(len(s10), 60)])  # the pole's, which is not in the table
-    longitudes, latitudes = np.meshgrid(
-        sky_glow.LONGITUDES_DEG, sky_glow.LATITUDES_DEG, indexing="ij"
-    )
+    axes = sky_glow.LONGITUDES_DEG, sky_glow.LATITUDES_DEG
+    longitudes, latitudes = np.meshgrid(*axes, indexing="ij")
     known = np.isfinite(s10)
     found = sky_glow.zodiacal(longitudes[known].astype(float), latitudes[known].astype(float))
     np.testing.assert_allclose(found, s10[known], rtol=0.004, atol=0.4)
@@ -70,9 +69,8 @@ def test_is_brighter_towards_the_sun_of_the_date() -> None:
 def test_milky_way_is_a_band_and_as_bright_as_published() -> None:
     pole = direction("pole", (192.85948, 27.12825))
     centre, away = direction("centre", (266.405, -28.936)), direction("away", (86.405, 28.936))
-    np.testing.assert_allclose(
-        sky_glow.milky_way(np.array([pole, centre, away])), [30, 640, 160], rtol=0.02
-    )
+    found = sky_glow.milky_way(np.array([pole, centre, away]))
+    np.testing.assert_allclose(found, [30, 640, 160], rtol=0.02)
     cygnus, lyra = direction("Cygnus", (305.0, 40.0)), direction("Bootes", (213.9, 19.2))
     in_it, beside = sky_glow.milky_way(np.array([cygnus, lyra]))
     assert in_it > 5 * beside

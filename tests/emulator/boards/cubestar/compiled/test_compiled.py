@@ -116,9 +116,8 @@ def test_sources_are_rewritten_in_the_careless_form() -> None:
     assert rewrite_source(line, "own") == line
     assert rewrite_source("float y = 0.5f * sqrtf(x);", "literals") == "float y = 0.5 * sqrt(x);"
     assert rewrite_source("float y = 1e-3f;", "double") == "double y = 1e-3f;"
-    assert (
-        rewrite_source("typedef float stored_float;\n", "double") == "typedef float stored_float;\n"
-    )
+    stored = "typedef float stored_float;\n"
+    assert rewrite_source(stored, "double") == stored
     with pytest.raises(ValueError, match="not O9"):
         Build("O9")
 
@@ -179,17 +178,14 @@ def test_timing_is_read_from_the_processor_registers(timing: Timing, mode: int) 
     assert machine.read(0x8000_0005, 1) == 0xA5
 
 
+BUSES = ((4, 0, 0, 0), (0, 4, 0, 0), (0, 0, 64, 0), (0, 0, 0, 4), (-1, 0, 0, 0))
+
+
 @pytest.mark.parametrize(
-    "changes",
-    [{"flash_waits": 3}, {"flash_waits": -1}]
-    + [
-        {"bus": bus}
-        for bus in ((4, 0, 0, 0), (0, 4, 0, 0), (0, 0, 64, 0), (0, 0, 0, 4), (-1, 0, 0, 0))
-    ],
+    "changes", [*({"flash_waits": n} for n in (3, -1)), *({"bus": bus} for bus in BUSES)]
 )
 def test_rejects_timings_that_registers_cannot_hold(changes: dict[str, Any]) -> None:
     with pytest.raises(ValueError, match="flash waits are 0 to 2, waits of the bus 0 to 3, 3, 63"):
         Timing(**changes)
-    assert str(Timing(0, False, True, (3, 3, 63, 3))) == (
-        "0 flash waits, no cache, prefetch, bus 3-3-63-3"
-    )
+    most = Timing(0, False, True, (3, 3, 63, 3))
+    assert str(most) == "0 flash waits, no cache, prefetch, bus 3-3-63-3"

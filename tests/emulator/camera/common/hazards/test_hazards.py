@@ -1,6 +1,8 @@
 import inspect
 import time
+import timeit
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -128,12 +130,8 @@ def test_hazard_adds_little_render_time(name: str) -> None:
     hazard = HAZARDS[name].sample(HAZARDS[name].strength.usual, None, np.random.default_rng(1))
 
     def seconds(*hazards: SensorHazard) -> float:
-        times = []
-        for _ in range(5):
-            start = time.process_time()
-            picture("cubestar", *hazards, scene=DARK)
-            times.append(time.process_time() - start)
-        return min(times)
+        render = partial(picture, "cubestar", *hazards, scene=DARK)
+        return min(timeit.repeat(render, timer=time.process_time, repeat=5, number=1))
 
     assert seconds(hazard) - seconds() < 0.1  # measured: below 10 ms
 
