@@ -1,11 +1,13 @@
 """The page in a real browser."""
 
 import json
+import re
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 SOON_MS = 30_000
@@ -42,13 +44,6 @@ def shown(chromium: Any, address: str, **options: Any) -> Iterator[Any]:
     assert not wrong, wrong
 
 
-def await_devices(chromium: Any, address: str) -> None:
-    page = chromium.new_context().new_page()
-    page.goto(address)
-    page.wait_for_selector("#line", timeout=STARTED_MS)
-    page.context.close()
-
-
 def local(url: str) -> bool:
     return url.startswith(("http://127.0.0.1:", "data:", "blob:"))
 
@@ -78,6 +73,20 @@ def line(page: Any, words: str) -> str:
     return str(told.json_value())
 
 
+def port_of(said: Iterable[str]) -> str:
+    """The TCP port that an emulation announces in its output."""
+    found = (re.search(r" serves on (tcp://\S+?),? ", one) for one in said)
+    return next(one[1] for one in found if one)
+
+
+def saved(page: Any, button: str, path: Path) -> Path:
+    """Clicks a button and saves the download as ``path``."""
+    with page.expect_download() as saving:
+        page.click(button)
+    saving.value.save_as(path)
+    return path
+
+
 HOSTILE = "<img src=x onerror=document.hacked=1>"
 
 ASKED_WITH = ("type", "frame", "field", "access", "what")
@@ -105,6 +114,14 @@ def hostile(value: Any) -> Any:
 
 LOOKS = [("dark", 390), ("dark", 1280), ("light", 1280), ("light", 390)]
 """Colour schemes, and widths in pixels of a telephone and of a screen."""
+
+
+def check_layout(page: Any, width: int) -> None:
+    """Nothing is wider than the page or covered, and all text has contrast."""
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    assert page.evaluate(COVERED) == []
+    assert page.evaluate(PALE) == []
+
 
 COVERED = """() => {
   const all = [...document.querySelectorAll("button, input, select, canvas, p, h1, h2, li, td")];

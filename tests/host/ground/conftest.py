@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from websockets.sync.client import ClientConnection, connect
 
 from cubestack.emulator.ports.control import ControlPort
 from cubestack.emulator.ports.pace import Pace
@@ -25,8 +26,9 @@ from cubestack.host.ground.page_app import page_app
 from cubestack.host.ground.serving import LOOPBACK, Serving
 from cubestack.host.ground.session import TargetSession
 from cubestack.host.recording.setups import emulated_setup
+from cubestack.host.targets import open_target
 
-from .browser import look, shown, station
+from .browser import STARTED_MS, look, shown, station
 
 TOKEN = "the token of the tests"
 BEARER = {"Authorization": f"Bearer {TOKEN}"}
@@ -48,6 +50,15 @@ def request(
         return answer, answer.read()
 
 
+def listening(
+    serving: Serving, path: str, headers: dict[str, str] | None = None
+) -> ClientConnection:
+    """A WebSocket to ``path``, by default with the token."""
+    address = serving.url.replace("http:", "ws:") + path
+    told = BEARER if headers is None else headers
+    return connect(address, additional_headers=told, open_timeout=SOON_S)
+
+
 @contextmanager
 def serving_pages(session: TargetSession) -> Iterator[Serving]:
     opened = Future[TargetSession]()
@@ -55,6 +66,16 @@ def serving_pages(session: TargetSession) -> Iterator[Serving]:
     serving = Serving(Guard(page_app([opened]), TOKEN), LOOPBACK, 0)
     with serving.running():
         yield serving
+
+
+def recorded_threshold(path: Path, after_s: float) -> Path:
+    """Records a CubeSense: a threshold is read, set to 9 ``after_s`` later, and read again."""
+    with closing(open_target("emulated:cubesense", record=path)) as target:
+        target.node.telemetry("Configuration")
+        target.node.pause(after_s)
+        target.node.command("DetectionThreshold1", Threshold=9)
+        target.node.telemetry("Configuration")
+    return path
 
 
 @dataclass
@@ -83,9 +104,14 @@ class Controlled:
     def emulated(self) -> AnyEmulated:
         return self.devices[0]
 
-    @property
-    def events(self) -> str:
-        return self.serving.url.replace("http:", "ws:") + "/events"
+    def act(self, *words: str) -> tuple[int, Any]:
+        return self.ask("POST", "/devices/cubestar/act", {"words": words})
+
+    def run(self, to_s: float) -> tuple[int, Any]:
+        return self.ask("POST", "/run", {"to_s": to_s})
+
+    def state(self) -> Any:
+        return self.ask("GET", "/state")[1]
 
 
 @pytest.fixture
@@ -114,10 +140,14 @@ def controlled(tmp_path: Path) -> Iterator[Controlled]:
 
 
 @pytest.fixture(scope="module")
-def address(chromium: Any) -> Iterator[str]:
-    """Address of a page with all sensors; its modules are one xdist group, so it starts once."""
-    targets = [f"emulated:{name}" for name in device_names()]
-    with station(*targets, "--seed", "5") as opened:
+def address(request: pytest.FixtureRequest, chromium: Any) -> Iterator[str]:
+    """Address of a page with the ``DEVICES`` of a test module, by default with all sensors."""
+    names = getattr(request.module, "DEVICES", device_names())
+    with station(*(f"emulated:{name}" for name in names), "--seed", "5") as opened:
+        page = chromium.new_context().new_page()
+        page.goto(opened)
+        page.wait_for_selector("#line", timeout=STARTED_MS)
+        page.context.close()
         yield opened
 
 

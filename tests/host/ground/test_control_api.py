@@ -3,11 +3,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from websockets.sync.client import connect
 
+from cubestack.host.emulation.controls import Controls, EmulatedControls
+from cubestack.host.emulation.remote_controls import TOKEN as VARIABLE
+from cubestack.host.emulation.remote_controls import ControlClient, RemoteControls
+from cubestack.host.emulation.remote_controls import controlled as controlled_at
+from cubestack.host.errors import PortOpenError, TargetError
 from cubestack.host.ground.control_api import CALLS
 
-from .conftest import BEARER, SOON_S, Controlled
+from .conftest import SOON_S, TOKEN, Controlled, listening
 
 
 def test_root_lists_all_calls(controlled: Controlled) -> None:
@@ -25,14 +29,14 @@ def test_document_describes_every_call() -> None:
 
 
 def test_pause_step_run_and_resume(controlled: Controlled) -> None:
-    controlled.ask("POST", "/run", {"to_s": 20.0})  # it has booted
+    controlled.run(20.0)  # it has booted
     _, held = controlled.ask("POST", "/pause")
     assert held["held"]
-    assert controlled.ask("GET", "/state")[1]["time_s"] == held["time_s"] == 20.0
+    assert controlled.state()["time_s"] == held["time_s"] == 20.0
     assert controlled.ask("POST", "/step") == (200, {"events": 0})  # it waits for its host
-    controlled.ask("POST", "/devices/cubestar/act", {"words": ["fault", "processor-reset"]})
+    controlled.act("fault", "processor-reset")
     assert controlled.ask("POST", "/step", {"events": 3}) == (200, {"events": 3})
-    status, there = controlled.ask("POST", "/run", {"to_s": 500})
+    status, there = controlled.run(500)
     assert (status, there["time_s"], there["held"]) == (200, 500.0, True)
     _, resumed = controlled.ask("POST", "/resume")
     assert not resumed["held"]
@@ -41,20 +45,19 @@ def test_pause_step_run_and_resume(controlled: Controlled) -> None:
 
 
 def test_act_executes_shell_commands(controlled: Controlled) -> None:
-    act = "/devices/cubestar/act"
-    before = controlled.ask("GET", "/state")[1]["devices"]["cubestar"]["currents_ma"]["total"]
-    _, state = controlled.ask("POST", act, {"words": ["power", "imager", "off"]})
+    before = controlled.state()["devices"]["cubestar"]["currents_ma"]["total"]
+    _, state = controlled.act("power", "imager", "off")
     assert state["devices"]["cubestar"]["currents_ma"]["total"] < before
     about = controlled.ask("GET", "/devices/cubestar")[1]
     assert "imager" in about["channels"]
     kind = "processor-reset"
     assert kind in about["faults"]
-    assert controlled.ask("POST", act, {"words": ["fault", kind]})[0] == 200
-    controlled.ask("POST", "/run", {"to_s": 100})
+    assert controlled.act("fault", kind)[0] == 200
+    controlled.run(100)
     log = controlled.ask("GET", "/devices/cubestar/log")[1]
     assert log["count"] == len(log["log"]) > 0
     assert kind in log["log"][0]
-    assert controlled.ask("GET", "/state")[1]["devices"]["cubestar"]["probes"]["resets"] == 1
+    assert controlled.state()["devices"]["cubestar"]["probes"]["resets"] == 1
 
 
 @pytest.mark.parametrize(
@@ -96,12 +99,10 @@ def test_rejects_invalid_requests(
 
 
 def test_events_report_state_and_log(controlled: Controlled) -> None:
-    with connect(
-        f"{controlled.events}?every_s=0.05", additional_headers=BEARER, open_timeout=SOON_S
-    ) as socket:
+    with listening(controlled.serving, "/events?every_s=0.05") as socket:
         first = json.loads(socket.recv(SOON_S))
-        controlled.ask("POST", "/devices/cubestar/act", {"words": ["fault", "processor-reset"]})
-        controlled.ask("POST", "/run", {"to_s": 50})
+        controlled.act("fault", "processor-reset")
+        controlled.run(50)
         while "log" not in (message := json.loads(socket.recv(SOON_S))):
             pass
         assert "processor-reset" in message["log"]["cubestar"][0]
@@ -114,19 +115,18 @@ def test_events_report_state_and_log(controlled: Controlled) -> None:
 
 def test_emulation_continues_after_clients_disconnect(controlled: Controlled) -> None:
     for _ in range(5):
-        connect(controlled.events, additional_headers=BEARER, open_timeout=SOON_S).socket.close()
+        listening(controlled.serving, "/events").socket.close()
     assert controlled.ask("GET", "/state")[0] == 200
 
 
 def test_back_returns_to_a_time_or_snapshot(controlled: Controlled) -> None:
-    act = "/devices/cubestar/act"
-    controlled.ask("POST", "/run", {"to_s": 20})
-    at_rest = controlled.ask("GET", "/state")[1]["devices"]
+    controlled.run(20)
+    at_rest = controlled.state()["devices"]
     assert controlled.ask("POST", "/snapshot", {"name": "rest"})[1]["snapshots"] == {"rest": 20.0}
-    controlled.ask("POST", "/run", {"to_s": 30})
-    controlled.ask("POST", act, {"words": ["power", "imager", "off"]})
-    controlled.ask("POST", act, {"words": ["fault", "processor-reset"]})
-    controlled.ask("POST", "/run", {"to_s": 40})
+    controlled.run(30)
+    controlled.act("power", "imager", "off")
+    controlled.act("fault", "processor-reset")
+    controlled.run(40)
     _, late = controlled.ask("POST", "/snapshot", {"name": "late"})
     assert late["devices"] != at_rest
     status, there = controlled.ask("POST", "/back", {"to": "rest"})
@@ -141,8 +141,8 @@ def test_back_returns_to_a_time_or_snapshot(controlled: Controlled) -> None:
 
 
 def test_recording_is_complete_at_any_time(controlled: Controlled) -> None:
-    controlled.ask("POST", "/run", {"to_s": 20})
-    controlled.ask("POST", "/devices/cubestar/act", {"words": ["power", "imager", "off"]})
+    controlled.run(20)
+    controlled.act("power", "imager", "off")
     status, text = controlled.ask("GET", "/devices/cubestar/recording", as_text=True)
     lines = [json.loads(line) for line in text.splitlines()]
     assert (status, lines[0]["device"]) == (200, "cubestar")
@@ -160,3 +160,69 @@ def test_back_needs_a_recording(controlled: Controlled) -> None:
         status, told = controlled.ask(method, path, body)
         assert (status, told["error"]) == (400, "no way back: --gdb goes forward only")
     assert controlled.ask("GET", "/devices/cubestar")[1]["no_past"] == "--gdb goes forward only"
+
+
+# --- a client of the control port -----------------------------------------------------------------
+
+
+@pytest.fixture
+def remote(controlled: Controlled) -> RemoteControls:
+    return RemoteControls(ControlClient(controlled.serving.url, TOKEN), "cubestar")
+
+
+def test_remote_controls_match_local_controls(
+    controlled: Controlled, remote: RemoteControls
+) -> None:
+    own: Controls = EmulatedControls(controlled.emulated)
+    assert (remote.channels, remote.faults) == (own.channels, own.faults)
+    assert remote.fault_parameters == own.fault_parameters
+    controlled.ask("POST", "/pause")
+    assert remote.currents() == own.currents()
+    assert remote.time_s() == pytest.approx(own.time_s())
+
+
+def test_remote_controls_act_on_the_device(
+    controlled: Controlled, remote: RemoteControls, tmp_path: Path
+) -> None:
+    controlled.ask("POST", "/pause")
+    before_s = remote.time_s()
+    remote.fault(["processor-reset"])
+    remote.advance(2.5)
+    assert remote.time_s() == pytest.approx(before_s + 2.5)
+    assert "processor-reset" in remote.fault_log()[0]
+    assert controlled.state()["held"]
+    remote.switch("imager", False)
+    assert remote.currents()["imager"] == 0.0
+    scene = tmp_path / "sky.toml"
+    scene.write_text('kind = "sky"\nra_deg = 1.0\ndec_deg = 2.0\nroll_deg = 3.0\n', "utf-8")
+    seen = controlled.emulated.scene
+    remote.scene(scene)
+    assert controlled.emulated.scene is not seen
+    with pytest.raises(TargetError, match="no channel"):
+        remote.switch("nobody", True)
+    with pytest.raises(ValueError, match="only where the device is emulated in this process"):
+        remote.peek("CMU")
+
+
+def test_advance_keeps_time_running(controlled: Controlled, remote: RemoteControls) -> None:
+    remote.advance(100.0)
+    assert not controlled.state()["held"]
+
+
+def test_token_is_read_from_the_environment(
+    controlled: Controlled, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(VARIABLE, TOKEN)
+    assert controlled_at(controlled.serving.url).device == "cubestar"
+    monkeypatch.setenv(VARIABLE, "another")
+    with pytest.raises(PortOpenError, match=f"requires its token in .{VARIABLE}"):
+        controlled_at(controlled.serving.url)
+
+
+def test_rejects_invalid_and_unreachable_urls(controlled: Controlled) -> None:
+    for url in ("nonsense", "http://127.0.0.1", "http://127.0.0.1:99999", ""):
+        with pytest.raises(TargetError, match="is not the address of a control port"):
+            ControlClient(url, "")
+    host, port = controlled.serving.address
+    with pytest.raises(PortOpenError, match="no control port answers"):
+        ControlClient(f"http://{host}:{port ^ 1}", TOKEN).ask("GET", "/")

@@ -6,16 +6,13 @@ from collections.abc import Iterator
 
 import pytest
 from websockets.exceptions import ConnectionClosedError, InvalidStatus
-from websockets.sync.client import connect
 
 from cubestack.host.errors import PortOpenError
 from cubestack.host.ground.guard import LARGEST_BODY
 from cubestack.host.ground.serving import MOST_CONNECTIONS, Serving, loopback_name
 from tests.tiers import quick
 
-from .conftest import SOON_S, TOKEN, Controlled
-
-ALLOWED = {"Authorization": f"Bearer {TOKEN}"}
+from .conftest import BEARER, SOON_S, TOKEN, Controlled, listening
 
 
 @pytest.mark.parametrize(
@@ -26,21 +23,21 @@ ALLOWED = {"Authorization": f"Bearer {TOKEN}"}
         ({"Authorization": "Bearer wrong"}, 401),
         ({"Authorization": f"Basic {TOKEN}"}, 401),
         ({"Cookie": "cubestack=wrong"}, 401),
-        (ALLOWED, 200),
-        (ALLOWED | {"Origin": "http://evil.example"}, 403),
-        (ALLOWED | {"Origin": "null"}, 403),
-        (ALLOWED | {"Host": "evil.example"}, 421),
-        (ALLOWED | {"Host": "evil.example:8700"}, 421),
-        (ALLOWED | {"Host": "localhost:1"}, 200),
-        (ALLOWED | {"Host": "[::1]"}, 200),
+        (BEARER, 200),
+        (BEARER | {"Origin": "http://evil.example"}, 403),
+        (BEARER | {"Origin": "null"}, 403),
+        (BEARER | {"Host": "evil.example"}, 421),
+        (BEARER | {"Host": "evil.example:8700"}, 421),
+        (BEARER | {"Host": "localhost:1"}, 200),
+        (BEARER | {"Host": "[::1]"}, 200),
     ],
 )
 def test_requests_need_token_origin_and_host(
     controlled: Controlled, headers: dict[str, str], status: int
 ) -> None:
-    held = controlled.ask("GET", "/state")[1]["held"]
+    held = controlled.state()["held"]
     assert controlled.ask("POST", "/pause", headers=headers)[0] == status
-    assert controlled.ask("GET", "/state")[1]["held"] == (held or status == 200)
+    assert controlled.state()["held"] == (held or status == 200)
 
 
 def test_address_with_token_sets_a_cookie(controlled: Controlled) -> None:
@@ -58,14 +55,14 @@ def test_address_with_token_sets_a_cookie(controlled: Controlled) -> None:
     connection.close()
 
 
-@pytest.mark.parametrize("headers", [{}, ALLOWED | {"Origin": "http://evil.example"}])
+@pytest.mark.parametrize("headers", [{}, BEARER | {"Origin": "http://evil.example"}])
 def test_websocket_needs_token_and_origin(controlled: Controlled, headers: dict[str, str]) -> None:
     with pytest.raises(InvalidStatus, match="403"):
-        connect(controlled.events, additional_headers=headers, open_timeout=SOON_S)
+        listening(controlled.serving, "/events", headers)
 
 
 def test_websocket_rejects_messages_above_1_mib(controlled: Controlled) -> None:
-    with connect(controlled.events, additional_headers=ALLOWED, open_timeout=SOON_S) as opened:
+    with listening(controlled.serving, "/events") as opened:
         opened.send(bytes(1 << 20))
         assert opened.ping().wait(SOON_S)
         opened.send(bytes((1 << 20) + 1))
@@ -113,8 +110,7 @@ def many_files() -> Iterator[None]:
 @pytest.mark.parametrize("count", quick([1_000, 10_000], 1))
 def test_many_connections_do_not_block_the_emulation(controlled: Controlled, count: int) -> None:
     kept = []
-    events = f"{controlled.events}?every_s=0.05"
-    with connect(events, additional_headers=ALLOWED, open_timeout=SOON_S) as watching:
+    with listening(controlled.serving, "/events?every_s=0.05") as watching:
         begun_s = json.loads(watching.recv(SOON_S))["state"]["time_s"]
         for number in range(count):
             raw = socket.create_connection(controlled.serving.address, SOON_S)

@@ -6,15 +6,14 @@ from typing import Any
 
 import pytest
 from websockets.exceptions import ConnectionClosedError
-from websockets.sync.client import connect
 
 from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.host.ground.page_app import PAGE
 from cubestack.host.ground.serving import Serving
-from cubestack.host.ground.session import LONGEST_LINE, PAGE_COMMANDS, TargetSession
+from cubestack.host.ground.session import LONGEST_LINE, TargetSession
 from cubestack.host.targets import open_target
 
-from .conftest import BEARER, SOON_S, request, serving_pages
+from .conftest import SOON_S, listening, request, serving_pages
 
 
 @pytest.fixture(scope="module")
@@ -139,13 +138,8 @@ def test_results_are_downloaded_as_csv(served: Serving) -> None:
     assert content.startswith(b"utc")
 
 
-def test_page_commands_touch_no_file() -> None:
-    assert not {"image", "scene", "watch"} & set(PAGE_COMMANDS)
-
-
 def test_shown_frames_are_read_repeatedly(served: Serving) -> None:
-    address = served.url.replace("http:", "ws:") + "/targets/0/live"
-    with connect(address, additional_headers=BEARER, open_timeout=SOON_S) as socket:
+    with listening(served, "/targets/0/live") as socket:
         assert "values" not in json.loads(socket.recv(SOON_S))
         show = ["Identification", "<script>", "TaskStatus"]
         socket.send(json.dumps({"show": show, "every_s": 0.2}))
@@ -157,8 +151,7 @@ def test_shown_frames_are_read_repeatedly(served: Serving) -> None:
 
 @pytest.mark.parametrize("nonsense", ["[]", "{", '{"every_s": "often"}', '{"show": 3}'])
 def test_invalid_message_closes_the_websocket(served: Serving, nonsense: str) -> None:
-    address = served.url.replace("http:", "ws:") + "/targets/0/live"
-    with connect(address, additional_headers=BEARER, open_timeout=SOON_S) as socket:
+    with listening(served, "/targets/0/live") as socket:
         socket.send(nonsense)
         with pytest.raises(ConnectionClosedError, match="1003"):
             [*iter(lambda: socket.recv(SOON_S), None)]

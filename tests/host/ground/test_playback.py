@@ -9,22 +9,15 @@ from cubestack.host.errors import NoAnswerError, TargetError
 from cubestack.host.ground.playback import PlaybackClient, is_recording, open_recording
 from cubestack.host.ground.relays import recording
 from cubestack.host.ground.session import TargetSession
-from cubestack.host.targets import Target, open_target
+from cubestack.host.targets import Target
 
 from ..conftest import LetterLine
+from .conftest import recorded_threshold
 
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Reads a threshold, sets it to 9 at 2 s or later, and reads it again."""
-    path = tmp_path_factory.mktemp("played") / "a.rec"
-    target = open_target("emulated:cubesense", record=path)
-    target.node.telemetry("Configuration")
-    target.node.pause(2.0)
-    target.node.command("DetectionThreshold1", Threshold=9)
-    target.node.telemetry("Configuration")
-    target.close()
-    return path
+    return recorded_threshold(tmp_path_factory.mktemp("played") / "a.rec", 2.0)
 
 
 def test_telemetry_is_that_of_the_played_time(made: Path) -> None:

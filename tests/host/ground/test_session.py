@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from websockets.sync.client import connect
 
 from cubestack.firmware_model.interface.cubestar import INTERFACE, AckError
 from cubestack.host.clients.node import NodeClient
@@ -19,7 +18,7 @@ from cubestack.host.transport.streams import SerialTransport
 
 from ..conftest import FakeCubeStar, UartLink
 from .cable import cable
-from .conftest import BEARER, SOON_S, serving_pages
+from .conftest import SOON_S, listening, serving_pages
 from .fast_server import Changing, Hurried
 
 
@@ -82,19 +81,21 @@ def test_device_is_not_read_while_time_is_held() -> None:
     target = Target("held", INTERFACE, NodeClient(uart, INTERFACE), device=device("cubestar"))
     target.controls = RemoteControls(port, "cubestar")  # type: ignore[arg-type]
     wanted = {"show": ["Identification"], "results": True, "every_s": 0.2}
-    with closing(TargetSession(target)) as session, serving_pages(session) as serving:
-        address = serving.url.replace("http:", "ws:") + "/targets/0/live"
-        with connect(address, additional_headers=BEARER, open_timeout=SOON_S) as socket:
-            socket.send(json.dumps(wanted))
-            held = [json.loads(socket.recv(SOON_S)) for _ in range(3)]
-            assert all(one["emulation"]["held"] and one["link"]["sent"] == 0 for one in held)
-            assert not any("values" in one or "results" in one for one in held)
-            port.held = False
-            while "values" not in (told := json.loads(socket.recv(SOON_S))):
-                pass
-            assert told["values"]["Identification"]["NodeType"] is not None
-            assert told["results_logged"] == 1
-            assert told["emulation"]["truth"]["ra_deg"] > 0
+    with (
+        closing(TargetSession(target)) as session,
+        serving_pages(session) as serving,
+        listening(serving, "/targets/0/live") as socket,
+    ):
+        socket.send(json.dumps(wanted))
+        held = [json.loads(socket.recv(SOON_S)) for _ in range(3)]
+        assert all(one["emulation"]["held"] and one["link"]["sent"] == 0 for one in held)
+        assert not any("values" in one or "results" in one for one in held)
+        port.held = False
+        while "values" not in (told := json.loads(socket.recv(SOON_S))):
+            pass
+        assert told["values"]["Identification"]["NodeType"] is not None
+        assert told["results_logged"] == 1
+        assert told["emulation"]["truth"]["ra_deg"] > 0
 
 
 @pytest.mark.skipif(shutil.which("socat") is None, reason="no socat")

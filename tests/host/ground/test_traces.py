@@ -18,10 +18,9 @@ def changes(text: str) -> vcd.Changes:
 
 
 def test_trace_of_a_past_time_span(controlled: Controlled) -> None:
-    controlled.ask("POST", "/run", {"to_s": 1.0})
-    act = {"words": ["fault", "processor-reset"]}
-    controlled.ask("POST", "/devices/cubestar/act", act)
-    controlled.ask("POST", "/run", {"to_s": 3.0})
+    controlled.run(1.0)
+    controlled.act("fault", "processor-reset")
+    controlled.run(3.0)
     status, text = controlled.ask("GET", f"{TRACE}?from_s=0.9&to_s=2.5", as_text=True)
     assert (status, text.splitlines()[0]) == (200, "$timescale 1 ns $end")
     found = changes(text)
@@ -29,7 +28,7 @@ def test_trace_of_a_past_time_span(controlled: Controlled) -> None:
     times = [time for all_of in found.values() for time, _ in all_of[1:]]
     assert min(times) >= 0.9e9
     assert max(times) <= 2.5e9
-    assert controlled.ask("GET", "/state")[1]["time_s"] == 3.0
+    assert controlled.state()["time_s"] == 3.0
     awake = found["firmware.awake"]
     assert len(awake) > 2  # it was reset in this span, and slept before and after
     before = controlled.ask("GET", f"{TRACE}?from_s=0.5&to_s=0.99", as_text=True)[1]
@@ -37,7 +36,7 @@ def test_trace_of_a_past_time_span(controlled: Controlled) -> None:
 
 
 def test_rejects_invalid_time_spans(controlled: Controlled) -> None:
-    controlled.ask("POST", "/run", {"to_s": 60.6})
+    controlled.run(60.6)
     for span, error in (
         ("from_s=0.5", "needs 'to_s'"),
         ("from_s=0&to_s=much", "could not convert"),
@@ -53,7 +52,7 @@ def test_rejects_invalid_time_spans(controlled: Controlled) -> None:
 
 
 def test_only_one_trace_at_a_time(controlled: Controlled) -> None:
-    controlled.ask("POST", "/run", {"to_s": 0.6})
+    controlled.run(0.6)
     with controlled.emulation.bench._free:
         status, told = controlled.ask("GET", f"{TRACE}?from_s=0&to_s=0.5")
     assert (status, told["error"]) == (409, "another waveform is being computed")

@@ -1,27 +1,16 @@
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from cubestack.host.targets import open_target
 from tests.emulator.recording import vcd
 
-from ..browser import HOSTILE, line, look, shown, station
+from ..browser import HOSTILE, line, look, saved, shown, station
+from ..conftest import recorded_threshold
 
 pytestmark = [pytest.mark.xdist_group("page acts"), pytest.mark.slow]
 
-
-@pytest.fixture(scope="module")
-def address(chromium: Any) -> Iterator[str]:
-    with station("emulated:cubestar", "emulated:cubesense", "--seed", "5") as opened:
-        yield opened
-
-
-@pytest.fixture
-def page(chromium: Any, address: str) -> Iterator[Any]:
-    with shown(chromium, address) as opened:
-        yield opened
+DEVICES = ("cubestar", "cubesense")
 
 
 def test_changed_setting_is_marked(page: Any) -> None:
@@ -40,7 +29,6 @@ def test_changed_setting_is_marked(page: Any) -> None:
 
 
 def test_registers_of_the_image_sensor_have_names(page: Any) -> None:
-    look(page, "CubeStar")
     page.click("#read-sensor")
     page.wait_for_selector("#sensor-status >> text=/ differ from their default$/")
     assert page.locator("#sensor-rows tr").count() == 9
@@ -52,7 +40,6 @@ def test_registers_of_the_image_sensor_have_names(page: Any) -> None:
 
 
 def test_waveform_of_the_pins_is_drawn(page: Any, tmp_path: Path) -> None:
-    look(page, "CubeStar")
     line(page, "write CaptureAndProcess")
     page.click("#pause")
     page.wait_for_selector("#pause[aria-pressed=true]")
@@ -68,10 +55,7 @@ def test_waveform_of_the_pins_is_drawn(page: Any, tmp_path: Path) -> None:
     assert drawn > 1000
     page.click("#waves-out")
     assert page.evaluate(blue) != drawn
-    with page.expect_download() as saving:
-        page.click("#save-waves")
-    saving.value.save_as(tmp_path / "a.vcd")
-    with (tmp_path / "a.vcd").open("rb") as stream:
+    with saved(page, "#save-waves", tmp_path / "a.vcd").open("rb") as stream:
         found = vcd.read(stream)
     assert max(time for all_of in found.values() for time, _ in all_of) > 0
     assert any(len(found[name]) > 2 for name in found if name.startswith("fpga."))
@@ -109,13 +93,7 @@ def test_saved_lines_are_kept_per_device(page: Any) -> None:
 
 
 def test_recording_is_played(chromium: Any, tmp_path: Path) -> None:
-    path = tmp_path / "run.rec"
-    target = open_target("emulated:cubesense", record=path)
-    target.node.telemetry("Configuration")
-    target.node.pause(60.0)
-    target.node.command("DetectionThreshold1", Threshold=9)
-    target.node.telemetry("Configuration")
-    target.close()
+    path = recorded_threshold(tmp_path / "run.rec", 60.0)
     with station(str(path)) as address, shown(chromium, address) as page:
         page.wait_for_selector("#playback-time >> text=/ of 6[0-9][.][0-9]+ s$/")
         page.select_option("#frame", "Configuration")
@@ -130,3 +108,8 @@ def test_recording_is_played(chromium: Any, tmp_path: Path) -> None:
         assert "a recording" in page.inner_text("#commands")
         page.click("#play")
         page.wait_for_selector("#play >> text=Play")
+        page.wait_for_selector("#scene-status >> text=/has no control port/")
+        for control in ("#scene-apply", "#scene-load", "#scene-kind", "#scene-text"):
+            assert page.locator(control).is_disabled()
+            assert "no control port" in page.locator(control).get_attribute("title")
+        assert not page.locator("#sky-map").is_visible()

@@ -1,6 +1,5 @@
 import csv
 import os
-import re
 from pathlib import Path
 from typing import Any
 
@@ -11,18 +10,9 @@ from cubestack.host.cli.main import main
 from cubestack.host.emulation.process import emulating
 from cubestack.host.recording.transcript import COLUMNS
 
-from ..browser import line, shown, station
+from ..browser import line, port_of, saved, shown, station
 
 pytestmark = [pytest.mark.xdist_group("page logs"), pytest.mark.slow]
-
-SERVES = re.compile(r" serves on (tcp://\S+?),? ")
-
-
-def saved(page: Any, button: str, path: Path) -> Path:
-    with page.expect_download() as saving:
-        page.click(button)
-    saving.value.save_as(path)
-    return path
 
 
 def rows_of(path: Path) -> list[dict[str, str]]:
@@ -67,8 +57,7 @@ def test_csv_and_parquet_tables_are_equal(chromium: Any, tmp_path: Path) -> None
 def test_saved_session_is_opened_later(chromium: Any, tmp_path: Path) -> None:
     kept = tmp_path / "session.rec"
     with emulating(["cubesense", "--tcp", "0"]) as said:
-        port = next(found[1] for one in said if (found := SERVES.search(one)))
-        words = [port, "--device", "cubesense", "--record", str(kept)]
+        words = [port_of(said), "--device", "cubesense", "--record", str(kept)]
         with station(*words) as address, shown(chromium, address) as page:
             line(page, "write DetectionThreshold1 77")
             line(page, "read Configuration")
@@ -87,8 +76,7 @@ def test_unavailable_downloads_are_disabled(chromium: Any, tmp_path: Path) -> No
     (tmp_path / "sitecustomize.py").write_text("import sys; sys.modules['pyarrow'] = None\n")
     environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
     with emulating(["cubesense", "--tcp", "0"]) as said:
-        port = next(found[1] for one in said if (found := SERVES.search(one)))
-        words = [port, "--device", "cubesense"]
+        words = [port_of(said), "--device", "cubesense"]
         with station(*words, environment=environment) as address, shown(chromium, address) as page:
             page.wait_for_selector("#transcript >> text=start with --record FILE")
             for button in ("#recording", "#transcript-csv", "#transcript-parquet", "#save-parquet"):

@@ -7,7 +7,7 @@ import pytest
 
 from tests.tiers import quick
 
-from ..browser import COVERED, LOOKS, PALE, line, look, shown
+from ..browser import LOOKS, check_layout, line, look, shown
 
 pytestmark = pytest.mark.xdist_group("page")  # so that its emulations are started once
 
@@ -182,8 +182,6 @@ def test_layout_and_contrast(chromium: Any, address: str, scheme: str, width: in
             look(page, device)
             page.click("#add-band")
             page.wait_for_selector("#timeline-legend li")
-            assert page.evaluate("document.documentElement.scrollWidth") <= width
-            assert page.evaluate(COVERED) == []
-            assert page.evaluate(PALE) == []
+            check_layout(page, width)
         dark = page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(20, 23, 28)"
         assert dark == (scheme == "dark")

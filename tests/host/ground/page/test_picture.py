@@ -7,7 +7,7 @@ from PIL import Image
 
 from cubestack.host.pictures.images import save_picture
 
-from ..browser import line, look
+from ..browser import line, look, saved
 
 GREEN = (
     "() => { const c = document.querySelector('#overlay');"
@@ -105,10 +105,8 @@ def test_picture_is_uploaded_and_downloaded(page: Any, tmp_path: Path) -> None:
     page.wait_for_selector("#transfer-status >> text=/ paused$/")
     page.click("#pause-transfer")
     page.wait_for_selector("#transfer-status >> text=/^download: 4096 of 4096 blocks, done$/")
-    with page.expect_download() as saving:
-        page.click("#save-image")
-    saving.value.save_as(tmp_path / "back.png")
-    assert np.array_equal(np.asarray(Image.open(tmp_path / "back.png")), picture)
+    back = saved(page, "#save-image", tmp_path / "back.png")
+    assert np.array_equal(np.asarray(Image.open(back)), picture)
     page.click("#download")
     page.wait_for_selector("#transfer-status >> text=/^download: .* in progress/")
     page.click("#cancel-transfer")

@@ -5,12 +5,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cubestack.host.targets import open_target
+from cubestack.firmware_model.reference.image import reference_image
 from tests.tiers import quick
 
-from ..browser import COVERED, HOSTILE, LOOKS, PALE, await_devices, hostile, look, shown, station
+from ..browser import HOSTILE, LOOKS, STARTED_MS, check_layout, hostile, look, shown
 
 pytestmark = pytest.mark.xdist_group("other pages")
+
+DEVICES = ("cubestar", "cubesense")
 
 INK = (
     "() => { const c = document.querySelector('#sky-map'); const n = new Set();"
@@ -21,13 +23,6 @@ INK = (
 """Counts the colours of the map."""
 
 VALUE = "label:has-text('{}') input.scene-value"
-
-
-@pytest.fixture(scope="module")
-def address(chromium: Any) -> Iterator[str]:
-    with station("emulated:cubestar", "emulated:cubesense", "--seed", "5") as opened:
-        await_devices(chromium, opened)
-        yield opened
 
 
 @pytest.fixture
@@ -216,9 +211,7 @@ def test_scene_form_fits_the_screen(chromium: Any, address: str, scheme: str, wi
             for summary in page.locator("#scene-keys > div > details > summary").all():
                 summary.click()
             page.click("[aria-label='add to hazards']")
-            assert page.evaluate("document.documentElement.scrollWidth") <= width
-            assert page.evaluate(COVERED) == []
-            assert page.evaluate(PALE) == []
+            check_layout(page, width)
             assert page.evaluate(INK) > 50  # grid, stars or discs, names, outlines
 
 
@@ -247,15 +240,37 @@ def test_scene_keys_are_escaped(chromium: Any, address: str) -> None:
         assert page.evaluate("document.hacked") is None
 
 
+def runs(page: Any, text: str) -> None:
+    page.wait_for_selector(f"#start-status >> text={text}", timeout=STARTED_MS)
+
+
 @pytest.mark.slow
-def test_recording_has_no_scene(chromium: Any, tmp_path: Any) -> None:
-    path = tmp_path / "run.rec"
-    target = open_target("emulated:cubesense", record=path)
-    target.node.telemetry("Configuration")
-    target.close()
-    with station(str(path)) as address, shown(chromium, address) as page:
-        page.wait_for_selector("#scene-status >> text=/has no control port/")
-        for control in ("#scene-apply", "#scene-load", "#scene-kind", "#scene-text"):
-            assert page.locator(control).is_disabled()
-            assert "no control port" in page.locator(control).get_attribute("title")
-        assert not page.locator("#sky-map").is_visible()
+def test_profile_and_firmware_are_selected(chromium: Any, address: str, tmp_path: Any) -> None:
+    with shown(chromium, address) as page, shown(chromium, address) as other:
+        runs(page, "running: seed 5, profile published")
+        fill(page, "ra_deg", "120")
+        page.click("#scene-apply")
+        page.wait_for_selector("#lines li.good >> text=scene")
+        page.select_option("#option-profile", "extended")
+        page.press("#restart", "Enter")
+        done = "#lines li.good >> text=/restart.*profile: extended/s"
+        page.wait_for_selector(done, timeout=STARTED_MS)
+        for tab in (page, other):
+            runs(tab, "running: seed 5, profile extended")
+            tab.wait_for_selector("#scene-status >> text=/camera 120.0°/")
+            tab.wait_for_function("() => document.querySelector('#time').textContent !== ''")
+        page.fill("#option-set", "nonsense=1")
+        page.click("#restart")
+        page.wait_for_selector("#lines li.bad >> text=/restart.*nonsense/s")
+        runs(page, "running: seed 5, profile extended")
+        page.fill("#option-set", "")
+        page.select_option("#option-profile", "published")
+        names = page.locator("#option-firmware option").all_inner_texts()
+        assert names == ["this project's model", "reference", "upload a file"]
+        page.select_option("#option-firmware", names[-1])
+        page.click("#restart")
+        page.wait_for_selector("#start >> text=firmware: choose a file")
+        page.set_input_files("#option-firmware-file", reference_image())
+        page.click("#restart")
+        runs(page, f"/firmware .*{reference_image().name}#/")
+        page.wait_for_selector("#scene-status >> text=/camera 120.0°/")

@@ -1,4 +1,3 @@
-import re
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
@@ -11,11 +10,9 @@ from cubestack.host.emulation.process import emulating
 from cubestack.host.pictures.images import png, save_picture
 from cubestack.host.targets import connect
 
-from ..browser import line, shown, station
+from ..browser import line, port_of, saved, shown, station
 
 pytestmark = pytest.mark.xdist_group("other pages")
-
-SERVES = re.compile(r" serves on (tcp://\S+?),? ")
 
 
 @pytest.fixture
@@ -23,7 +20,7 @@ def port(request: pytest.FixtureRequest) -> Iterator[str]:
     """Port of an emulated device; one client at a time."""
     words = [request.param, "--tcp", "0", "--pace", "fast", "--seed", "3"]
     with emulating(words) as said:
-        yield next(found[1] for one in said if (found := SERVES.search(one)))
+        yield port_of(said)
 
 
 def downloaded(page: Any, path: Path, source: str | None = None) -> bytes:
@@ -32,10 +29,7 @@ def downloaded(page: Any, path: Path, source: str | None = None) -> bytes:
         page.select_option("#source", source)
     page.click("#download")
     page.wait_for_selector("#transfer-status >> text=/^download: .* done$/")
-    with page.expect_download() as saving:
-        page.click("#save-image")
-    saving.value.save_as(path)
-    return path.read_bytes()
+    return saved(page, "#save-image", path).read_bytes()
 
 
 @pytest.mark.parametrize("port", ["cubestar"], indirect=True)
