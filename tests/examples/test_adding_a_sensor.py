@@ -141,6 +141,40 @@ READING = (
     '            total += yield cs.ReadPin("CONVERTER")\n'
 )
 
+MOST_LINES = 150
+
+
+@pytest.mark.parametrize("name", ["glow", "m9_lux"])
+def test_writes_a_small_folder_that_the_linter_passes(name: str, run: Run, tmp_path: Path) -> None:
+    folder = tmp_path / "sensor"
+    outcome = run("new-sensor", name, "--out", folder)
+    assert outcome.code == 0
+    assert f"pip install --no-build-isolation -e {folder}" in outcome.out
+    files = [path for path in folder.rglob("*") if path.is_file()]
+    assert {str(path.relative_to(folder)) for path in files} == {
+        *("pyproject.toml", f"tests/test_{name}.py", f"{name}/__init__.py", f"{name}/sensor.py")
+    }
+    texts = [path.read_text(encoding="utf-8") for path in files]
+    assert sum(len(text.splitlines()) for text in texts) <= MOST_LINES
+    for command in (["check", "--select", "E,F,W,I,UP,B,SIM,RUF,C4,PT,N"], ["format", "--check"]):
+        ruff = [sys.executable, "-m", "ruff", *command, "--isolated", "--line-length", "100"]
+        done = subprocess.run(ruff, cwd=folder, capture_output=True, text=True)
+        assert done.returncode == 0, done.stdout
+
+
+def test_the_folder_is_named_after_the_sensor(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run("new-sensor", "glow").code == 0
+    assert (tmp_path / "glow-sensor" / "glow" / "sensor.py").exists()
+    outcome = run("new-sensor", "glow")
+    assert (outcome.code, outcome.line) == (
+        2,
+        "cubestack new-sensor: glow-sensor exists; remove it, or choose another with --out",
+    )
+
+
 #: An edit, and the line that follows, with {text} for the number of the only line that has it.
 MISTAKES: dict[str, tuple[Edit, str]] = {
     "telemetry_without_source": (
@@ -251,33 +285,25 @@ def numbered(line: str, folder: Path) -> re.Pattern[str]:
     return re.compile(re.sub(r"\{(.+?)\}", number, line) + "$")
 
 
-@pytest.mark.parametrize("mistake", MISTAKES)
-def test_mistake_in_a_declaration_is_one_line(mistake: str, run: Run, tmp_path: Path) -> None:
-    edit, line = MISTAKES[mistake]
+@pytest.mark.parametrize("mistake", [*MISTAKES, *WHILE_RUNNING])
+def test_mistake_in_the_declaration_or_the_firmware_is_one_line(
+    mistake: str, run: Run, tmp_path: Path
+) -> None:
+    edit, line = (MISTAKES | WHILE_RUNNING)[mistake]
+    commands: list[tuple[object, ...]] = [
+        ("measure", "glow"),
+        ("shell", "emulated:glow", "-c", "write Measure; time 0.1; read Light"),
+    ]
+    if mistake in MISTAKES:
+        commands += [("emulate", "glow", "--pty", tmp_path / "tty")]
     with new_sensor(tmp_path, edit):
-        for command in (
-            ("measure", "glow"),
-            ("shell", "emulated:glow", "-c", "read Light"),
-            ("emulate", "glow", "--pty", tmp_path / "tty"),
-        ):
+        for command in commands:
             outcome = run(*command)
             assert outcome.code == 2
-            assert numbered(line, tmp_path).search(outcome.line), outcome.line
-        assert run("measure", "aramis", "--help").code == 0, "others are measured all the same"
-
-
-@pytest.mark.parametrize("mistake", WHILE_RUNNING)
-def test_mistake_in_the_firmware_is_one_line(mistake: str, run: Run, tmp_path: Path) -> None:
-    edit, line = WHILE_RUNNING[mistake]
-    with new_sensor(tmp_path, edit):
-        for command in (
-            ("measure", "glow"),
-            ("shell", "emulated:glow", "-c", "write Measure; time 0.1; read Light"),
-        ):
-            outcome = run(*command)
-            assert outcome.code == 2
+            assert outcome.out == "" or mistake in WHILE_RUNNING
             (error,) = outcome.err.splitlines()
             assert numbered(line, tmp_path).search(error), error
+        assert run("measure", "aramis", "--help").code == 0, "others are measured all the same"
 
 
 def test_edits_of_the_document_work(

@@ -109,34 +109,23 @@ def test_history_is_saved_and_tab_completes(
     run: Run, asked: Asked, typed: list[Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     readline = pytest.importorskip("readline")
-    seen = dict[str, Any]()
-    monkeypatch.setattr(readline, "get_endidx", lambda: len(seen["line"]))
-    monkeypatch.setattr(readline, "get_line_buffer", lambda: seen["line"] + " behind the cursor")
+    completions = {"re": ["read ", "reset ", None], "write A ": ["Gain=", "B ", None], "x": [None]}
 
-    class Typist(list[Any]):
-        def pop(self, *_at: Any) -> Any:
-            complete, found = readline.get_completer(), {}
-            for line in ("re", "write A ", "x"):
-                seen["line"] = line
-                words = [complete("", 0)]
-                while words[-1] is not None:
-                    words.append(complete("", len(words)))
-                found[line] = words
-            seen["found"] = found
-            readline.add_history("what was typed")
-            return super().pop(0)
+    def ask(_prompt: str) -> str:
+        for line, words in completions.items():
+            buffer = line + " behind the cursor"
+            monkeypatch.setattr(readline, "get_endidx", lambda end=len(line): end)
+            monkeypatch.setattr(readline, "get_line_buffer", lambda text=buffer: text)
+            assert [readline.get_completer()("", n) for n in range(len(words))] == words
+        readline.add_history("what was typed")
+        return "quit"
 
-    lines = Typist(["one"])
-    monkeypatch.setattr("builtins.input", lambda _prompt: lines.pop() if lines else "quit")
+    monkeypatch.setattr("builtins.input", ask)
     assert run("shell", "fake").code == 0
-    assert seen["found"] == {
-        "re": ["read ", "reset ", None],
-        "write A ": ["Gain=", "B ", None],
-        "x": [None],
-    }
     history = tmp_path / "cubestack" / "history"
     assert "what was typed" in history.read_text("utf-8")
     readline.clear_history()
+    monkeypatch.setattr("builtins.input", lambda _prompt: "quit")
     assert run("shell", "fake").code == 0
     assert readline.get_history_item(readline.get_current_history_length()) == "what was typed"
 

@@ -79,11 +79,6 @@ def test_remote_listening_needs_allow_remote(ports, kind):
     assert len(ports(f"--{kind}", "0", "--listen", "0.0.0.0", "--allow-remote")) == 2
 
 
-def test_tcp_and_rfc2217_exclude_each_other(ports):
-    with pytest.raises(argparse.ArgumentError, match="not allowed with"):
-        ports("--tcp", "0", "--rfc2217", "0")
-
-
 def test_strict_line_rejects_tcp(ports):
     with pytest.raises(ValueError, match="a TCP client sets no baud rate; use --pty or --rfc2217"):
         ports("--tcp", "0", "--strict-line")

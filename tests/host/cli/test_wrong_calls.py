@@ -28,6 +28,7 @@ FAILED, WRONG_CALL = 1, 2
         ("demo --seed -1", "seed", "-1"),
         ("measure cubestar --mode guessing", "guessing", "tracking"),
         ("emulate cubestar --pty a --tcp 4000", "--pty", "--tcp"),
+        ("emulate cubestar --tcp 0 --rfc2217 0", "--rfc2217: not allowed with argument --tcp"),
         ("emulate cubestar --tcp 70000", "70000", "65535"),
         ("emulate aramis --engine compiled", "--engine", "FPGA"),
         ("emulate cubestar cubestar", "once", "cubestar"),

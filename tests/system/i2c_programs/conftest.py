@@ -5,10 +5,9 @@ import shutil
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
-from typing import NamedTuple
 
 import pytest
 
@@ -17,6 +16,7 @@ from cubestack.emulator.i2cdev.preload.shim import find_c_compiler
 from cubestack.emulator.i2cdev.scheduler import open_scheduler
 from cubestack.emulator.i2cdev.server import I2cServer
 from cubestack.host.emulation.emulated import open_device
+from tests.conftest import Outcome, Run
 from tests.tiers import quick
 
 COMMAND = (sys.executable, "-m", "cubestack.host.cli.main", "run")
@@ -30,15 +30,6 @@ needs_tools = pytest.mark.skipif(
     shutil.which("i2ctransfer", path=ENVIRONMENT["PATH"]) is None, reason="no i2c-tools here"
 )
 needs_c = pytest.mark.skipif(find_c_compiler() is None, reason="no C compiler here")
-
-
-class Outcome(NamedTuple):
-    code: int
-    out: str
-    err: str
-
-
-Run = Callable[..., Outcome]
 
 
 class Latch:

@@ -10,7 +10,8 @@ from cubestack.emulator.i2cdev.scheduler import MAX_DEBT_NS
 from cubestack.host.cli.main import main
 from tests.tiers import quick
 
-from .conftest import COMMAND, TIMEOUT_S, Run, start
+from ...conftest import Run
+from .conftest import COMMAND, TIMEOUT_S, start
 
 
 def test_faults_of_the_bus_reach_the_program(run: Run, tmp_path: Path) -> None:

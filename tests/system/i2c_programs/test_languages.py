@@ -6,7 +6,8 @@ import pytest
 
 from cubestack.emulator.i2cdev.preload.shim import find_c_compiler
 
-from .conftest import TIMEOUT_S, Run, needs_c
+from ...conftest import Run
+from .conftest import TIMEOUT_S, needs_c
 
 CLIENT = Path(__file__).with_name("i2c_client.c")
 

@@ -11,7 +11,8 @@ from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
 from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
 from cubestack.firmware_model.node.state import FIRMWARE_VERSION
 
-from .conftest import LATCH, Run, needs_tools
+from ...conftest import Run
+from .conftest import LATCH, needs_tools
 
 pytestmark = needs_tools
 

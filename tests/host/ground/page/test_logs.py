@@ -45,6 +45,7 @@ def test_csv_and_parquet_tables_are_equal(chromium: Any, tmp_path: Path) -> None
                 assert row.keys() == cells.keys()
                 assert all(same(cells[key], row[key]) for key in row), (row, cells)
         recording = saved(page, "#recording", tmp_path / "a.rec")
+    assert main(["replay", str(recording)]) == 0
     results = pyarrow.parquet.read_table(tmp_path / "results.parquet")
     assert str(results.schema.field("ra_deg").type) == "double"
     said = rows_of(tmp_path / "said.csv")

@@ -1,6 +1,3 @@
-import subprocess
-import sys
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -106,19 +103,6 @@ def test_back_returns_to_a_snapshot(page: Any) -> None:
         told for _ in range(20) if "no answer" not in (told := line(page, "read Configuration"))
     )
     assert "Threshold1: 7" in told
-
-
-@pytest.mark.slow
-def test_saved_recording_replays(page: Any, tmp_path: Path) -> None:
-    look(page, "CubeSense")
-    line(page, "read Identification")
-    with page.expect_download() as saving:
-        page.click("#recording")
-    saved = tmp_path / saving.value.suggested_filename
-    saving.value.save_as(saved)
-    assert saved.name == "cubesense.rec"
-    call = [sys.executable, "-m", "cubestack", "replay", str(saved)]
-    assert subprocess.run(call, stdout=subprocess.DEVNULL).returncode == 0
 
 
 def test_fault_is_injected_and_logged(page: Any) -> None:
