@@ -1,8 +1,6 @@
 import json
 import re
 import shutil
-import signal
-import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -14,10 +12,11 @@ import pytest
 import cubestack as library
 from cubestack.emulator.native.compiler import find_compiler
 from cubestack.host.devices.registry import device
+from cubestack.host.emulation.process import emulating
 from cubestack.host.ground import scenes
 
 from ..conftest import Run
-from .conftest import ROOT, TIMEOUT_S, Installed, installed, plugins
+from .conftest import ROOT, Installed, installed, plugins
 
 PROJECT = ROOT / "examples" / "linear_sun_sensor"
 SCENE = PROJECT / "scene.toml"
@@ -195,23 +194,11 @@ def test_gateware_proofs(cubestack: Command, name: str) -> None:
 
 def test_emulated_port_is_opened_by_another_process(sensor: Installed, tmp_path: Path) -> None:
     port = tmp_path / "tty"
-    command = [sys.executable, "-m", "cubestack", "emulate", "sunslit", "--pty", str(port)]
-    serving = subprocess.Popen(
-        [*command, "--scene", str(SCENE), "--pace", "fast"],
-        env={**sensor.environment, "COLUMNS": "500"},
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    with serving:
-        try:
-            assert serving.stderr is not None
-            while f"SunSlit serves on {port}" not in (line := serving.stderr.readline()):
-                assert line
-            with library.connect(str(port), "sunslit") as client:
-                found = client.measure()
-        finally:
-            serving.send_signal(signal.SIGINT)
-        assert serving.wait(TIMEOUT_S) == 0
+    words = ["sunslit", "--pty", str(port), "--scene", str(SCENE), "--pace", "fast"]
+    with emulating(words, {**sensor.environment, "COLUMNS": "500"}) as said:
+        assert any(line.startswith(f"SunSlit serves on {port}") for line in said)
+        with library.connect(str(port), "sunslit") as client:
+            found = client.measure()
     assert found.angle_deg == pytest.approx(TRUTH_DEG, abs=TOLERANCE_DEG)
 
 

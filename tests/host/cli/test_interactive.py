@@ -2,6 +2,7 @@ import io
 import json
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -113,9 +114,9 @@ def test_history_is_saved_and_tab_completes(
 
     def ask(_prompt: str) -> str:
         for line, words in completions.items():
-            buffer = line + " behind the cursor"
-            monkeypatch.setattr(readline, "get_endidx", lambda end=len(line): end)
-            monkeypatch.setattr(readline, "get_line_buffer", lambda text=buffer: text)
+            shown = line + " behind the cursor"
+            monkeypatch.setattr(readline, "get_endidx", partial(len, line))
+            monkeypatch.setattr(readline, "get_line_buffer", partial(str, shown))
             assert [readline.get_completer()("", n) for n in range(len(words))] == words
         readline.add_history("what was typed")
         return "quit"

@@ -105,10 +105,15 @@ def test_missing_dependency_names_the_extra(words: list[str], missing: str) -> N
 SOON_S = 60.0
 
 
-def begun(*words: str) -> "subprocess.Popen[str]":
+def begun(until: str, *words: str) -> "subprocess.Popen[str]":
+    """A command that has printed ``until``."""
     pipe = subprocess.PIPE
     call = [*CALL, *words]
-    return subprocess.Popen(call, stdout=pipe, stderr=pipe, text=True, preexec_fn=heard)
+    process = subprocess.Popen(call, stdout=pipe, stderr=pipe, text=True, preexec_fn=heard)
+    assert process.stderr is not None
+    while until not in (line := process.stderr.readline()):
+        assert line
+    return process
 
 
 def heard() -> None:
@@ -117,22 +122,10 @@ def heard() -> None:
         signal.signal(number, signal.SIG_DFL)
 
 
-def alive(process: int) -> bool:
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    state = Path(f"/proc/{process}/stat").read_text("utf-8").rpartition(")")[2].split()[0]
-    return state != "Z"
-
-
 @pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGTERM, signal.SIGINT])
 def test_signal_removes_the_pty_link(number: signal.Signals, tmp_path: Path) -> None:
     link = tmp_path / "tty"
-    with begun("emulate", "cubestar", "--pty", str(link)) as process:
-        assert process.stderr is not None
-        while "serves on" not in (line := process.stderr.readline()):
-            assert line
+    with begun("serves on", "emulate", "cubestar", "--pty", str(link)) as process:
         assert link.is_symlink()
         process.send_signal(number)
         process.communicate(timeout=SOON_S)
@@ -145,18 +138,13 @@ def test_signal_removes_the_pty_link(number: signal.Signals, tmp_path: Path) -> 
 def test_signal_ends_the_emulation_process(
     words: tuple[str, ...], number: signal.Signals, tmp_path: Path
 ) -> None:
-    with begun(*(word.format(folder=tmp_path) for word in words)) as process:
-        assert process.stderr is not None
-        while "Ctrl-C" not in (line := process.stderr.readline()):
-            assert line
+    with begun("Ctrl-C", *(word.format(folder=tmp_path) for word in words)) as process:
         (child,) = children(process.pid)
+        ending = os.pidfd_open(child)  # readable once the process has ended
         process.send_signal(number)
         process.wait(SOON_S)
-        if alive(child):  # its end is something to wait for
-            waiting = os.pidfd_open(child)
-            assert select.select([waiting], [], [], SOON_S)[0]
-            os.close(waiting)
-    assert not alive(child)
+        assert select.select([ending], [], [], SOON_S)[0]
+        os.close(ending)
 
 
 def children(process: int) -> set[int]:
@@ -167,10 +155,9 @@ def children(process: int) -> set[int]:
 
 @pytest.mark.slow
 def test_interrupt_shows_the_measurements_so_far() -> None:
-    with begun("measure", "cubestar", "--frames", "5000", "--threshold", "25") as process:
-        assert process.stderr is not None
-        while " of 5000, " not in (line := process.stderr.readline()):
-            assert line
+    with begun(
+        " of 5000, ", "measure", "cubestar", "--frames", "5000", "--threshold", "25"
+    ) as process:
         process.send_signal(signal.SIGINT)
         shown, told = process.communicate(timeout=SOON_S)
     assert process.returncode == 128 + signal.SIGINT

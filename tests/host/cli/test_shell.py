@@ -1,3 +1,5 @@
+import contextlib
+import io
 import json
 import os
 import pty
@@ -9,13 +11,20 @@ from functools import partial
 import pytest
 
 from cubestack.emulator.native.compiler import find_compiler
+from cubestack.firmware_model.formats.recording import load_recording
 from cubestack.firmware_model.interface.cubesense.codes import ImageSize
+from cubestack.host.cli.main import main
 from cubestack.host.clients.cubesense import client
 from cubestack.host.clients.cubesense.download import download_image
+from cubestack.host.emulation.process import emulating
 
 TIMEOUT_S = 60
 
-pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
+pytestmark = [
+    pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler"),
+    # pyserial's RFC 2217
+    pytest.mark.filterwarnings("ignore:set(Daemon|Name):DeprecationWarning"),
+]
 
 
 @pytest.fixture
@@ -116,3 +125,65 @@ def test_interactive(tmp_path):
         os.close(master)
     history = (tmp_path / "cubestack" / "history").read_text()
     assert "read Identification" in history
+
+
+# --- every kind of target -------------------------------------------------------------------------
+
+BUS = 16 + os.getpid() % 200
+COMMANDS = (
+    "read 128 NodeType; write DetectionThreshold1 77; read Configuration Threshold1;"
+    "write 41 Threshold=78; read Configuration;"
+    "watch Configuration 2 0.01; list 41; read 250"
+)
+SAID = ("NodeType  4", "Threshold1  77", "Threshold2   78 DN", "DetectionThreshold2: done")
+KINDS = ("pty", "tcp", "rfc2217", "i2c", "recorded", "recorded i2c")
+
+
+@contextlib.contextmanager
+def serving(kind, folder):
+    """Serves a CubeSense on a port of ``kind``; yields the target that opens it."""
+    given = {"pty": ["--pty", str(folder / "tty")], "i2c": ["--i2c", str(BUS), "--tcp", "0"]}
+    words = ["cubesense", "--pace", "fast", *given.get(kind, [f"--{kind}", "0"])]
+    with emulating(words, {"COLUMNS": "500"}) as said:
+        line = next(line for line in said if line.startswith("CubeSense serves on "))
+        yield f"i2c:{BUS}:0x1b" if kind == "i2c" else line.split()[3]
+
+
+@pytest.fixture
+def shell_on(tmp_path, monkeypatch, run):
+    """Runs commands on a kind of target; exit status, output, errors."""
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+
+    def call(kind, commands, *options):
+        if kind.startswith("recorded"):
+            made = tmp_path / "session.rec"
+            call("i2c" if "i2c" in kind else "tcp", commands, "--record", made)
+            assert load_recording(made).setup.target.startswith(("i2c:", "tcp://"))
+            return run("shell", f"recorded:{made}", "-c", commands)
+        with serving(kind, tmp_path) as target:
+            return run("shell", target, "--device", "cubesense", "-c", commands, *options)
+
+    return call
+
+
+@pytest.fixture(scope="module")
+def emulated():
+    """Result of the commands on a device in this process."""
+    out, err = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        code = main(["shell", "emulated:cubesense", "-c", COMMANDS])
+    errors = err.getvalue().splitlines(keepends=True)
+    return code, out.getvalue(), "".join(one for one in errors if not one.startswith("opening "))
+
+
+def test_emulated_device_runs_the_commands(emulated):
+    code, out, err = emulated
+    assert code == 2
+    for text in SAID:
+        assert text in out
+    assert "near: " in err
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_of_target_gives_the_same_output(shell_on, emulated, kind):
+    assert shell_on(kind, COMMANDS) == emulated

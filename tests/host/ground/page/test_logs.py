@@ -44,7 +44,11 @@ def test_csv_and_parquet_tables_are_equal(chromium: Any, tmp_path: Path) -> None
             for row, cells in zip(rows, table, strict=False):
                 assert row.keys() == cells.keys()
                 assert all(same(cells[key], row[key]) for key in row), (row, cells)
-        recording = saved(page, "#recording", tmp_path / "a.rec")
+        with page.expect_download() as saving:
+            page.click("#recording")
+        assert saving.value.suggested_filename == "cubestar.rec"
+        recording = tmp_path / "a.rec"
+        saving.value.save_as(recording)
     assert main(["replay", str(recording)]) == 0
     results = pyarrow.parquet.read_table(tmp_path / "results.parquet")
     assert str(results.schema.field("ra_deg").type) == "double"
