@@ -26,7 +26,7 @@ class MyDriver:
         raise TimeoutError("no answer")
 
 
-def test_reads_the_node_type(cubestar: Any) -> None:
+def test_driver_reads_the_node_type(cubestar: Any) -> None:
     assert MyDriver(cubestar.serial()).node_type() == 5
 
 

@@ -37,7 +37,7 @@ def test_source_distribution_has_every_file(tmp_path: Path) -> None:
 
 
 @pytest.mark.xdist_group("kept together")
-def test_groups_are_known(request: pytest.FixtureRequest) -> None:
+def test_pytest_xdist_groups_are_effective(request: pytest.FixtureRequest) -> None:
     """Some versions of pytest and xdist ignore groups without a warning."""
     if not request.config.getoption("loadgroup", False):
         pytest.skip("tests run in one process or without groups")

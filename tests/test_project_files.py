@@ -79,7 +79,7 @@ def test_pytest_options_of_the_workflows_exist() -> None:
 
 
 @pytest.mark.slow
-def test_measurement_of_the_workflows_passes(run: Any) -> None:
+def test_documented_ci_measurement_succeeds(run: Any) -> None:
     (words,) = {
         one.partition("cubestack ")[2]
         for name, workflow in workflows()

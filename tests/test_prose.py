@@ -29,9 +29,9 @@ def test_finds_phrase_in_prose(path: str, text: str, line: int) -> None:
         ("a.js", "const is = told;\n"),
     ],
 )
-def test_ignores_code(path: str, text: str) -> None:
+def test_prose_check_ignores_code(path: str, text: str) -> None:
     assert not [*prose.hits(path, text)]
 
 
-def test_tree_has_no_hits(capsys: pytest.CaptureFixture[str]) -> None:
+def test_repository_has_no_prose_hits(capsys: pytest.CaptureFixture[str]) -> None:
     assert prose.main() == 0, capsys.readouterr().out

@@ -62,7 +62,7 @@ def test_commands_and_public_names_are_documented(site: Path) -> None:
         assert "\nNone\n</code>" not in names  # a docstring that is missing
 
 
-def test_search_works_from_a_file(site: Path, chromium: Any) -> None:
+def test_site_search_works_from_the_file_system(site: Path, chromium: Any) -> None:
     page = chromium.new_page()
     page.goto(f"{(site / 'index.html').as_uri()}?q=pseudo-terminal")
     results = page.wait_for_selector(".md-search-result__item >> text=Serve a serial port")

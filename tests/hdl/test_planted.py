@@ -183,7 +183,7 @@ def wrong_verilog(bug: Bug, top: str) -> str:
 
 
 @pytest.mark.parametrize(("bug", "top"), quick(CASES, 4))
-def test_is_caught(bug: Bug, top: str, tmp_path: Path) -> None:
+def test_planted_bug_is_caught(bug: Bug, top: str, tmp_path: Path) -> None:
     (tmp_path / "dut.v").write_text(wrong_verilog(bug, top), encoding="utf-8")
     outcome = run_tier(top, tmp_path / "dut.v", tmp_path / "tier")
     assert outcome.failed, outcome.problem or "not caught"
@@ -195,7 +195,7 @@ def test_every_kind_is_planted_in_both_sensors() -> None:
         assert {"cubestar", "cubesense-pair"} <= tops, kind
 
 
-def test_document_has_every_bug() -> None:
+def test_documentation_lists_every_planted_bug() -> None:
     document = Path(__file__).parents[2] / "docs" / "gateware-tests.md"
     _, _, section = document.read_text(encoding="utf-8").partition("| Kind | Bugs |\n|---|---|\n")
     titles = {kind: dict.fromkeys(b.title for b in BUGS if b.kind == kind) for kind in KINDS}
@@ -203,7 +203,7 @@ def test_document_has_every_bug() -> None:
     assert section.startswith("\n".join([*rows, "\n"]))
 
 
-def test_nothing_is_left_behind() -> None:
+def test_planting_a_bug_leaves_the_design_unchanged() -> None:
     before = verilog_text(TIERS[STAR].make(), "dut")
     wrong_verilog(BUGS[0], STAR)
     assert verilog_text(TIERS[STAR].make(), "dut") == before

@@ -40,7 +40,7 @@ SHALLOW = [name for name in FAST if name not in ("sun-ack", "sun-scan", "sun-fir
 
 
 @pytest.mark.parametrize("name", quick(FAST, 4))
-def test_property_is_proved(name: str) -> None:
+def test_gateware_property_is_proved(name: str) -> None:
     assert prove(PROOFS[name])[:2] == (True, False)
 
 
@@ -88,7 +88,7 @@ def test_unknown_wire_is_named(proof: Proof) -> None:
 
 
 @pytest.mark.filterwarnings("ignore::amaranth.hdl.UnusedElaboratable")
-def test_a_register_without_reset_must_be_declared() -> None:
+def test_idle_proof_requires_registers_without_reset_to_be_declared() -> None:
     def harness(m: Module, d: SimpleNamespace) -> None:
         idle_is_reset(m, d, ~d.ENABLE, set())
 
@@ -97,7 +97,7 @@ def test_a_register_without_reset_must_be_declared() -> None:
     gc.collect()  # what was refused is never elaborated; have Amaranth say so here
 
 
-def test_verdict_says_what_went_wrong() -> None:
+def test_proof_verdict_states_what_went_wrong() -> None:
     good, bad = ProofResult(True, False, 1, 0.5), ProofResult(False, False, 4, 0.5)
     refuted = ProofResult(False, True, 3, 0.5)
     scan = "sun-scan", PROOFS["sun-scan"]

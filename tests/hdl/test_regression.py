@@ -36,7 +36,7 @@ def moments(results: Path) -> dict[str, str]:
     }
 
 
-def test_same_seed_same_run(verilog: Path, tmp_path: Path) -> None:
+def test_same_seed_repeats_the_simulation(verilog: Path, tmp_path: Path) -> None:
     """To the picosecond, where every moment is random."""
     runner = build(verilog, tmp_path / "build")
     found = []
@@ -52,7 +52,7 @@ def test_same_seed_same_run(verilog: Path, tmp_path: Path) -> None:
     assert all(first[name] != other[name] for name in first)
 
 
-def test_tier_passes_and_stops_at_the_first_failure(verilog: Path, tmp_path: Path) -> None:
+def test_tier_stops_at_the_first_failure(verilog: Path, tmp_path: Path) -> None:
     text = verilog.read_text(encoding="utf-8")
     inverted = text.replace("assign SRAM_WE_N = ", "assign SRAM_WE_N = ~ ", 1)
     assert inverted != text

@@ -51,11 +51,11 @@ def file(name: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
         flow_checks.bidirectional_pins_are_in_the_wrapper_only,
     ],
 )
-def test_file(file: Path, check: Callable[[Path], None]) -> None:
+def test_verilog_file_is_accepted_by_the_tools(file: Path, check: Callable[[Path], None]) -> None:
     check(file)
 
 
-def test_every_pin_and_every_bit_is_listed(name: str, file: Path) -> None:
+def test_verilog_file_lists_every_pin_and_bit(name: str, file: Path) -> None:
     top = TOPS[name]
     published = 64 if name.startswith("cubesense") and top.parts == 1 else None
     flow_checks.every_pin_and_every_bit_is_listed(file, top, published)
@@ -71,19 +71,19 @@ def core(component: CubeStarTop, name: str) -> str:
     return re.sub(r"\bx_core\b", name, text[text.index("module x_core") :])
 
 
-def test_core_stores_and_reads(icarus: Any) -> None:
+def test_verilog_core_passes_the_store_and_read_testbenches(icarus: Any) -> None:
     """The benches of the design, on the file's text; it has no initial values either."""
     icarus.run(CubeStarTop, 8, 4, *modules(STAR, "store", "read"), seed=1, text=core)
 
 
-def test_wrapper_releases_its_pins(tmp_path: Path) -> None:
+def test_verilog_wrapper_releases_its_tristate_pins(tmp_path: Path) -> None:
     file = flow_checks.written("cubesense-sun", TOPS["cubesense-sun"], tmp_path)
     bench, program = Path(__file__).with_name("tri_state.v"), tmp_path / "all.vvp"
     assert not said("iverilog", "-g2005", "-s", "bench", "-o", program, file, bench)
     assert said("vvp", program).splitlines()[0] == "good"
 
 
-def test_same_text_again() -> None:
+def test_verilog_file_generation_is_reproducible() -> None:
     small = Top(partial(CubeStarTop, 8, 4), "small", ())
     assert verilog_file("small", small) == verilog_file("small", small)
 
@@ -107,7 +107,7 @@ class Inverter(Component):
 
 
 @pytest.mark.parametrize("text", TEXTS)
-def test_same_text_again_and_in_another_process(text):
+def test_generated_text_is_reproducible_across_processes(text):
     program = (
         "import sys\nfrom cubestack.hdl.flow import generate\n"
         "from cubestack.hdl.cubestar.top import CubeStarTop\n"
@@ -146,7 +146,7 @@ def test_hash_distinguishes_designs_and_names():
     assert len(hashes) == 3
 
 
-def test_builtin_yosys_whatever_the_user_set(monkeypatch):
+def test_builtin_yosys_is_used_whatever_the_environment_says(monkeypatch):
     monkeypatch.setenv("AMARANTH_USE_YOSYS", "system")
     monkeypatch.setenv("YOSYS", "no-such-yosys")
     assert "module top" in generate.verilog_text(Inverter())

@@ -12,7 +12,9 @@ def test_install_command_names_the_packages_of_an_extra() -> None:
 
 
 @pytest.mark.parametrize("quote", "'\"")
-def test_quotes_of_the_metadata_do_not_matter(monkeypatch: pytest.MonkeyPatch, quote: str) -> None:
+def test_install_command_accepts_both_quotes_in_metadata(
+    monkeypatch: pytest.MonkeyPatch, quote: str
+) -> None:
     lines = [f"a>=1; extra == {quote}x{quote}", f"b; extra == {quote}xy{quote}", "c"]
     monkeypatch.setattr("cubestack.host.errors.requires", lambda _: lines)
     assert install_command("x") == "pip install 'a>=1'"

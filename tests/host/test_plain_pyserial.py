@@ -52,7 +52,7 @@ def test_prints_the_attitude(uart: Any, node: Any, qbar0: float) -> None:
     assert [name for name, _ in node.log] == ["CaptureAndProcess"]
 
 
-def test_reports_a_picture_without_attitude(uart: Any, node: Any) -> None:
+def test_driver_reports_an_image_without_attitude(uart: Any, node: Any) -> None:
     node.values["TaskStatus"] = {"taskStatus": 25}
     result = run_against(uart)
     assert (result.returncode, result.stderr) == (1, "no attitude in this image\n")

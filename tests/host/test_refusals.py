@@ -40,7 +40,7 @@ compiled = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
 # --- the command line -----------------------------------------------------------------------------
 
 
-def test_picture_rejects_a_scene_without_sky(run: Run, tmp_path: Path) -> None:
+def test_picture_command_rejects_a_scene_without_sky(run: Run, tmp_path: Path) -> None:
     Image.fromarray(np.zeros((512, 1024), np.uint8)).save(tmp_path / "p.png")
     (tmp_path / "s.toml").write_text('kind = "picture"\nfile = "p.png"\n', "utf-8")
     words = ["picture", "cubestar", "--scene", tmp_path / "s.toml", "--out", tmp_path / "x.png"]
@@ -49,7 +49,7 @@ def test_picture_rejects_a_scene_without_sky(run: Run, tmp_path: Path) -> None:
 
 
 @compiled
-def test_picture_names_an_unwritable_file(run: Run, tmp_path: Path) -> None:
+def test_picture_command_names_an_unwritable_file(run: Run, tmp_path: Path) -> None:
     out = tmp_path / "no" / "x.png"
     found = run("picture", "cubestar", "--ra", "84", "--dec", "-1", "--out", out)
     assert found.code == 2
@@ -140,7 +140,7 @@ def test_unreadable_document_is_reported(tmp_path: Path) -> None:
         read_document(tmp_path / "none.toml")
 
 
-def test_orbit_rejects_a_picture_scene() -> None:
+def test_orbit_rejects_an_image_scene() -> None:
     looking: Any = SimpleNamespace(scene=object(), device=device("cubestar"))
     with pytest.raises(ValueError, match="cubestar looks at a picture, which follows no orbit"):
         _seen(SimpleNamespace(), looking)  # type: ignore[arg-type]

@@ -60,7 +60,7 @@ def test_recording_names_its_device(tmp_path):
     target.close()
 
 
-def test_recording_of_a_bus(tmp_path):
+def test_recorded_i2c_bus_opens_as_a_target(tmp_path):
     path = tmp_path / "a.rec"
     messages = (BusMessage(0x1B, b"\x80", False), BusMessage(0x1B, bytes(8), True))
     write(path, [BusTransfer(0, "i2c", 9, messages)])
@@ -69,7 +69,7 @@ def test_recording_of_a_bus(tmp_path):
     assert target.node.telemetry("Identification")["NodeType"] == 0
 
 
-def test_recording_of_a_silent_bus(tmp_path):
+def test_empty_i2c_recording_raises_a_mismatch(tmp_path):
     path = tmp_path / "a.rec"
     path.write_text('{"recording":1,"device":"cubesense","lines":{}}\n')
     with pytest.raises(RecordingMismatchError, match="the recording ends after 0 transfers"):
@@ -84,7 +84,7 @@ def test_recording_of_a_silent_bus(tmp_path):
         ("./tty", "CubeStar has no registers on a UART: leave out --backup"),
     ],
 )
-def test_backup_needs_a_register_uart(text, error):
+def test_backup_option_requires_a_device_with_uart_registers(text, error):
     with pytest.raises(TargetError, match=error):
         open_target(text, "cubestar", backup=True)
 

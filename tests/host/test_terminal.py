@@ -56,7 +56,7 @@ def test_progress_prints_plain_lines_when_not_a_tty(lines: Lines) -> None:
     assert all(line.endswith(" s left") for line in lines[1:] if "0 of 3" not in line)
 
 
-def test_earlier_steps_do_not_count_for_the_rate(lines: Lines) -> None:
+def test_progress_rate_ignores_steps_done_before(lines: Lines) -> None:
     def items() -> Iterator[int]:
         yield from range(1000)
         assert lines.heard.wait(10.0)
@@ -97,7 +97,7 @@ def test_long_result_lines_are_not_wrapped(
 
 
 @pytest.mark.parametrize("title", ["a title", "as long as a row of thirty"])
-def test_title_has_a_rule_if_it_fits(monkeypatch: pytest.MonkeyPatch, title: str) -> None:
+def test_terminal_title_has_a_rule_if_it_fits(monkeypatch: pytest.MonkeyPatch, title: str) -> None:
     file = replace_console(monkeypatch, 30, is_terminal=True)
     terminal.head(title)
     assert f"─ {title} ─" in file.getvalue()

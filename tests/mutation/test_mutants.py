@@ -54,7 +54,7 @@ def record(root: Path, tests: dict[str, float], ran: list[tuple[str, int]], path
         ("def f(a: Literal[1]) -> Literal[2]: ...", []),
     ],
 )
-def test_mutants_of_a_text(text: str, expected: list[str]) -> None:
+def test_source_text_yields_the_expected_mutants(text: str, expected: list[str]) -> None:
     assert sorted(m.put_into(text) for m in mutants(HERE, text)) == sorted(expected)
 
 
@@ -72,7 +72,7 @@ def test_seed_determines_the_selection() -> None:
     assert sorted(one) == sorted(other)
 
 
-def test_changes_elsewhere_keep_the_selection(
+def test_mutant_selection_of_a_file_survives_changes_in_other_files(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("tests.mutation.__main__.ROOT", tmp_path)
@@ -116,7 +116,7 @@ def test_unrecorded_tests_are_run_for_near_modules(tmp_path: Path) -> None:
     assert near(Path("emulator/bus/uart.py"), new) == [other + "test_old[2]"]
 
 
-def test_mutant_faces_the_tests_that_run_its_line(tmp_path: Path) -> None:
+def test_mutant_runs_against_the_tests_that_cover_its_line(tmp_path: Path) -> None:
     # However many they are, the others are faced as well.
     of_documents = [f"{DOCUMENTS[0]}::test_defaults[{number}]" for number in range(MOST_TESTS)]
     names = "tests/test_a.py::test_f", "test_b.py::test_g", "test_c.py::test_h", *of_documents

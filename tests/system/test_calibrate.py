@@ -27,7 +27,7 @@ def calibrate(capsys: pytest.CaptureFixture[str], *arguments: object) -> dict:
     return json.loads(capsys.readouterr().out)
 
 
-def test_finds_the_lens_of_an_emulated_unit(
+def test_calibrate_finds_the_lens_of_an_emulated_cubestar(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     """The model of a camera file is within 0.1 px of the tables' distortion."""
@@ -43,7 +43,7 @@ def test_finds_the_lens_of_an_emulated_unit(
 
 
 @pytest.mark.slow
-def test_photographs_give_their_camera(
+def test_calibrate_finds_the_camera_of_photographs(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, photographs: Path
 ) -> None:
     some = tmp_path / "some"

@@ -41,13 +41,13 @@ def check_attitude(device: Any, output: str) -> None:
     assert abs(roll) < 0.05
 
 
-def test_flight_driver(device: Any, flight_driver: Path) -> None:
+def test_flight_driver_prints_the_attitude(device: Any, flight_driver: Path) -> None:
     done = device.run(flight_driver, "{port}")
     assert (done.returncode, done.stderr) == (0, "")
     check_attitude(device, done.stdout)
 
 
-def test_flight_driver_on_a_bad_line(device: Any, flight_driver: Path) -> None:
+def test_flight_driver_survives_a_corrupted_line(device: Any, flight_driver: Path) -> None:
     device.faults.inject("uart-corrupt", direction="to-host", at_s=0.3, for_s=0.3)
     done = device.run(flight_driver, "{port}", pace="real")
     assert done.returncode == 0, done.stderr
@@ -55,24 +55,24 @@ def test_flight_driver_on_a_bad_line(device: Any, flight_driver: Path) -> None:
     check_attitude(device, done.stdout)
 
 
-def test_flight_driver_with_a_dead_camera(device: Any, flight_driver: Path) -> None:
+def test_flight_driver_reports_a_dead_camera(device: Any, flight_driver: Path) -> None:
     device.faults.inject("camera-dead")
     done = device.run(flight_driver, "{port}")
     assert done.returncode == 1
     assert done.stderr == "flight_driver: no attitude in this picture\n"
 
 
-def test_flight_driver_without_a_port(flight_driver: Path) -> None:
+def test_flight_driver_reports_a_missing_port(flight_driver: Path) -> None:
     done = run(flight_driver, "/nowhere")
     assert (done.returncode, done.stderr) == (1, "flight_driver: No such file or directory\n")
 
 
-def test_smbus2_attitude(device: Any, capfd: pytest.CaptureFixture[str]) -> None:
+def test_smbus2_example_prints_the_attitude(device: Any, capfd: pytest.CaptureFixture[str]) -> None:
     assert device.run_on_i2c(sys.executable, HERE / "smbus2_attitude.py", "7") == 0
     check_attitude(device, capfd.readouterr().out)
 
 
-def test_bringup(device: Any) -> None:
+def test_bringup_example_passes_all_six_steps(device: Any) -> None:
     done = device.run(sys.executable, HERE / "bringup.py", "{port}")
     assert done.returncode == 0, done.stdout + done.stderr
     assert [line.split()[1] for line in done.stdout.splitlines()] == ["ok"] * 6

@@ -28,7 +28,9 @@ def capture_ms(cubestar: Any, delay_ms: int) -> float:
 @pytest.mark.parametrize(
     ("register", "published_fps"), [(30, 11.110), (9, 3.333), (8, 2.966), (7, 2.593), (6, 2.224)]
 )
-def test_frame_rate_register(session: Any, register: int, published_fps: float) -> None:
+def test_frame_rate_register_sets_the_published_period(
+    session: Any, register: int, published_fps: float
+) -> None:
     with session(SkyScene.pointing(0, 0)) as opened:
         opened.client.client.command("SetFrameRate", FrameRate=register)
         period_ms = 1000 / published_fps
@@ -49,7 +51,9 @@ def striped(tmp_path: Path) -> PictureScene:
 
 
 @pytest.mark.parametrize("delay_ms", [10, 66])
-def test_short_delay_splits_the_picture(session: Any, striped: PictureScene, delay_ms: int) -> None:
+def test_too_short_delay_splits_the_image(
+    session: Any, striped: PictureScene, delay_ms: int
+) -> None:
     with session(striped) as opened:
         capture_ms(opened.client, delay_ms)
         rows = opened.board.program._capture.memory.image[:, 500].astype(float)
@@ -65,7 +69,7 @@ def test_short_delay_splits_the_picture(session: Any, striped: PictureScene, del
 
 
 @pytest.mark.slow
-def test_published_delay_gives_a_whole_picture(session: Any, striped: PictureScene) -> None:
+def test_published_delay_yields_a_whole_image(session: Any, striped: PictureScene) -> None:
     with session(striped) as opened:
         capture_ms(opened.client, 70)
         streamed = opened.client.stream_image().astype(float)

@@ -111,7 +111,7 @@ def node(request: pytest.FixtureRequest) -> Iterator[Node]:
 only = pytest.mark.parametrize("node", [Layout.SHARED], indirect=True)
 
 
-def test_layouts_give_the_same_bytes_and_attitude(node: Node, published: Published) -> None:
+def test_layouts_return_the_same_bytes_and_attitude(node: Node, published: Published) -> None:
     assert node.seen() == published.seen
     phases = node.cubestar.phase_times()
     assert (phases["transfer"], phases["capture"]) == (0, pytest.approx(384, abs=1))
@@ -124,7 +124,7 @@ def test_layouts_give_the_same_bytes_and_attitude(node: Node, published: Publish
     assert all(block == published.block(number) for number, block in streamed)
 
 
-def test_uploaded_and_drawn_pictures_are_in_memory(node: Node) -> None:
+def test_uploaded_and_test_pattern_images_are_in_memory(node: Node) -> None:
     rng = np.random.default_rng(4)
     picture = np.zeros((512, 1024), np.uint8)
     picture[100:102] = rng.integers(0, 256, (2, 1024))
@@ -148,7 +148,7 @@ def test_memory_test_takes_bus_time_and_finds_a_stuck_bit(node: Node) -> None:
         node.board.faults.inject("memory-stuck", address=4711, bit=3, level=0)
 
 
-def test_block_read_during_storing_is_the_last_picture_or_flagged(
+def test_block_read_during_a_store_is_the_last_image_or_flagged(
     node: Node, published: Published
 ) -> None:
     node.cubestar.capture()
@@ -176,7 +176,7 @@ def test_lost_acknowledge_fails_one_capture(node: Node) -> None:
     assert node.cubestar.capture_and_process() is TaskStatus.CALCULATED
 
 
-def test_memory_latch_up_loses_only_the_picture(node: Node, published: Published) -> None:
+def test_memory_latch_up_loses_only_the_image(node: Node, published: Published) -> None:
     node.cubestar.capture()
     assert node.block(published.star) == published.block(published.star)
     node.board.power.latch_up("memory")
@@ -188,7 +188,7 @@ def test_memory_latch_up_loses_only_the_picture(node: Node, published: Published
     assert node.cubestar.capture_and_process() is TaskStatus.CALCULATED
 
 
-def test_imager_latch_up_during_detection_loses_the_picture(node: Node) -> None:
+def test_imager_latch_up_during_detection_loses_the_image(node: Node) -> None:
     node.cubestar.capture()
     picture = node.memory[: 1 << 19].copy()
     node.client.command("DetectStars")
@@ -227,7 +227,9 @@ def test_banks_are_separate(node: Node, published: Published) -> None:
 
 
 @pytest.mark.slow
-def test_loop_rate_and_age_of_each_layout(capsys: pytest.CaptureFixture[str]) -> None:
+def test_layouts_command_measures_loop_rate_and_attitude_age(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     """Two memories double the rate; attitudes without a copy are younger than 600 ms."""
     assert main(["layouts", "--seconds", "2", "--json", "--profile", "extended"]) == 0
     lines = capsys.readouterr().out.splitlines()
@@ -253,7 +255,7 @@ def test_loop_rate_and_age_of_each_layout(capsys: pytest.CaptureFixture[str]) ->
 
 
 @pytest.mark.parametrize("node", [Layout.TWO_MEMORIES], indirect=True)
-def test_two_memories_alternate(node: Node) -> None:
+def test_captures_alternate_between_two_memories(node: Node) -> None:
     into = []
     set_pin = node.board.engine.set_pin
 
@@ -275,7 +277,9 @@ def test_only_option_3_needs_too_many_pins() -> None:
     assert [fpga.pins for fpga in fpgas.values()] == [55, 66, 95, 66]
 
 
-def test_commands_note_layouts_that_can_not_be_built(measure: Measure, emulate: Emulate) -> None:
+def test_commands_print_a_notice_for_layouts_that_cannot_be_built(
+    measure: Measure, emulate: Emulate
+) -> None:
     option = next(one for one in device("cubestar").options if one.name == "layout")
     (line,) = filter(None, map(option.notice, option.choices))
     assert "layout 3 can't be built with an AGLN030: its FPGA takes 95 pins of 77" in line

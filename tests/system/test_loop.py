@@ -70,7 +70,7 @@ def looping(session: Open) -> Iterator[Any]:
         yield start
 
 
-def test_an_iteration_takes_one_second_with_the_published_phases_and_power(looping: Any) -> None:
+def test_iteration_takes_1_s_with_the_published_phases_and_power(looping: Any) -> None:
     opened = looping(ORION)
     start_ps, start_mas = opened.board.kernel.now, opened.board.power.charge_mas()
     turns = run_loop(opened, ORION, ITERATIONS)
@@ -88,7 +88,7 @@ def test_an_iteration_takes_one_second_with_the_published_phases_and_power(loopi
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
-def test_tracks_at_the_published_rate(looping: Any, axis: int) -> None:
+def test_loop_tracks_at_the_published_rate(looping: Any, axis: int) -> None:
     scene = replace(ORION, rate_deg_s=0.1333 * np.eye(3)[axis])
     turns = run_loop(looping(scene), scene, ITERATIONS)
     assert all(turn.attitude.valid for turn in turns)
@@ -130,14 +130,14 @@ def matched_share(opened: Any, rate_deg_s: float, rng: np.random.Generator) -> f
     return matched / detected
 
 
-def test_two_degrees_a_second_smear_the_stars(session: Any, rng: np.random.Generator) -> None:
+def test_rotation_of_2_deg_per_s_smears_the_stars(session: Any, rng: np.random.Generator) -> None:
     # Not to the last star, as published: a few streaks happen to peak at the same place.
     with session(ORION, profile="extended") as opened:
         assert matched_share(opened, 0.1333, rng) > 0.95
         assert matched_share(opened, 2.0, rng) < 0.4
 
 
-def test_tracking_is_lost_at_two_degrees_a_second(looping: Any) -> None:
+def test_tracking_is_lost_at_2_deg_per_s(looping: Any) -> None:
     scene = replace(ORION, rate_deg_s=(2.0, 0.0, 0.0))
     opened = looping(scene)
     turns = run_loop(opened, scene, ITERATIONS // 2)  # smeared stars take long to draw

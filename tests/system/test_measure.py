@@ -49,7 +49,7 @@ def p95(frames: Frames, key: str) -> float:
     ),
     ids=["lost in space", "within five degrees", "within its radius", "among false stars"],
 )
-def test_rates_of_identification(
+def test_identification_rates_meet_the_targets_per_mode(
     measure: Measure, options: tuple[object, ...], mode: str, percent: float
 ) -> None:
     frames = measure(*SAMPLE, *options, "--profile", "extended")
@@ -101,7 +101,7 @@ def test_errors_without_noise_are_small(measure: Measure) -> None:
         assert a["quaternion"] != b["quaternion"]
 
 
-def test_form_of_a_frame_and_its_errors_are_those_of_the_quaternions(measure: Measure) -> None:
+def test_measured_frame_has_its_keys_and_errors_match_its_quaternions(measure: Measure) -> None:
     """Quaternions are scalar last, inertial to camera; the boresight is camera axis z."""
     for frame in measure("--frames", 5, "--mag-limit", 3.8, "--seed", 2):
         assert frame.keys() == KEYS
@@ -130,7 +130,7 @@ def test_a_seed_repeats_everything_but_wall_time(measure: Measure, more: tuple[o
     assert run(5) != run(6)
 
 
-def test_photographs(measure: Measure, photographs: Path) -> None:
+def test_photographs_are_solved_lost_in_space(measure: Measure, photographs: Path) -> None:
     pictures = sorted(photographs.glob("*.jpg"))
     assert len(pictures) == 8
     for picture in pictures:
@@ -149,7 +149,7 @@ def _turning(profile: str, frames: int, rate_deg_s: float) -> list[Shot]:
 
 @pytest.mark.parametrize("profile", PROFILES)
 @pytest.mark.parametrize("rate", [0.0635, 0.1333])
-def test_slow_turns_are_tracked_by_every_star(profile: str, rate: float) -> None:
+def test_slow_rotation_is_tracked_with_every_star(profile: str, rate: float) -> None:
     taken = _turning(profile, PICTURES, rate)
     assert all(shot.right and shot.matched >= shot.detected - 1 for shot in taken)
     assert [shot.tracked for shot in taken] == [False] + [True] * (PICTURES - 1)

@@ -193,7 +193,9 @@ def test_every_row_of_the_page_is_tested(name: str) -> None:
 
 
 @pytest.mark.parametrize(("name", "column", "what", "parameters"), RESETS)
-def test_reset(name: str, column: int, what: str, parameters: dict[str, Any]) -> None:
+def test_reset_keeps_only_what_is_documented(
+    name: str, column: int, what: str, parameters: dict[str, Any]
+) -> None:
     hangs = {"loop": False} if what == "TestWDG" else {}  # else the loop is under way when it ends
     with powered(name, "published") as bench:
         saved = PREPARE[name](bench, **hangs)
@@ -211,7 +213,9 @@ def test_reset(name: str, column: int, what: str, parameters: dict[str, Any]) ->
 
 
 @pytest.mark.parametrize("name", BENCHES)
-def test_power_cycle(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_power_cycle_keeps_only_what_is_documented(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     with powered(name, "published") as bench:
         saved = PREPARE[name](bench)
         before = there_is(name, bench)

@@ -54,7 +54,7 @@ def test_example_is_short_and_uses_only_the_protocol() -> None:
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_signal_stops_it_cleanly(emulate: Emulate, tmp_path: Path, number: int) -> None:
+def test_signal_stops_the_emulation_cleanly(emulate: Emulate, tmp_path: Path, number: int) -> None:
     with emulate("--pty", "port") as served:
         assert (tmp_path / "port").is_char_device()
         served.process.send_signal(number)

@@ -35,7 +35,7 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 
 
 @pytest.mark.parametrize("route", quick(["seccomp", "preload"], 1))
-def test_a_program_finds_every_device(served: None, route: str) -> None:
+def test_guest_program_finds_every_device_on_a_shared_bus(served: None, route: str) -> None:
     run = [*COMMAND, "run", "--bus", str(BUS), "--attach", "--route", route, "--"]
     probe = subprocess.run([*run, "true"], capture_output=True, text=True, timeout=60)
     if probe.returncode != 0:

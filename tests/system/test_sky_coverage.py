@@ -37,7 +37,7 @@ def coverage(limit: float, rng: np.random.Generator) -> tuple[float, float, floa
 
 
 @pytest.mark.parametrize("limit", PUBLISHED)
-def test_table(limit: float, rng: np.random.Generator) -> None:
+def test_sky_coverage_matches_the_published_table(limit: float, rng: np.random.Generator) -> None:
     counted = coverage(limit, rng)
     print(f"V < {limit}: {counted[0]:.2f} % {counted[1]:.2f} % {counted[2]:.2f}")
     assert counted == pytest.approx(PUBLISHED[limit], abs=TOLERANCE)

@@ -110,7 +110,7 @@ def test_loop_resets_keep_the_switches(extended: dict[str, AnyEmulated]) -> None
 @pytest.mark.parametrize("name", NAMES)
 @settings(max_examples=15)
 @given(st.data())
-def test_any_sequence_of_profile_and_switch_commands(
+def test_any_profile_and_switch_command_sequence_matches_a_model(
     extended: dict[str, AnyEmulated], name: str, data: st.DataObject
 ) -> None:
     """Compared with a model that has only the numbers of the tables."""

@@ -22,7 +22,7 @@ EXAMPLES = Path(__file__).parents[2]
 
 @need_yosys
 @pytest.mark.parametrize("name", quick(tops_in(TOPS), 1))
-def test_verilog_file(name: str, tmp_path: Path) -> None:
+def test_i2c_verilog_file_is_accepted_by_the_tools(name: str, tmp_path: Path) -> None:
     top = tops_in(TOPS)[name]
     file = flow_checks.written(name, top, tmp_path)
     flow_checks.icarus_takes_it_without_a_warning(file)
@@ -37,7 +37,7 @@ def test_verilog_file(name: str, tmp_path: Path) -> None:
 @pytest.mark.slow
 @need_yosys
 @pytest.mark.parametrize("name", designs_with_area(TOPS))
-def test_area(name: str) -> None:
+def test_area_matches_the_recorded_tile_counts(name: str) -> None:
     assert list(recorded_areas(AREA_FILE)) == list(designs_with_area(TOPS))
     design = designs_with_area(TOPS)[name]
     flow_checks.area_is_as_recorded(name, design, AREA_FILE, ice40=isinstance(design, Top))
@@ -47,7 +47,7 @@ def test_area(name: str) -> None:
 @pytest.mark.parametrize(
     "name", quick([name for name in PROOFS if not name.startswith("nadir")], 1)
 )
-def test_proof(name: str) -> None:
+def test_i2c_proofs_hold_and_planted_bugs_are_refuted(name: str) -> None:
     """One of the two equal FPGAs."""
     assert prove(PROOFS[name]).proved
     assert prove(PROOFS[name], planted=True).counterexample

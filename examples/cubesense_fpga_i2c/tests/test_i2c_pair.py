@@ -20,14 +20,14 @@ SMALL = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("module", SMALL)
-def test_pair(simulate: Any, module: str) -> None:
+def test_i2c_pair_passes_its_testbenches(simulate: Any, module: str) -> None:
     simulate(SMALL[module], module, seed=1)
 
 
-def test_full_size(simulate: Any) -> None:
+def test_i2c_pair_passes_its_testbenches_at_full_size(simulate: Any) -> None:
     simulate(FULL_SIZE, "benches_i2c_full_size", "benches_i2c_times", seed=1)
 
 
 @pytest.mark.skipif("I2C_WHOLE" not in os.environ, reason="takes a minute: set I2C_WHOLE")
-def test_whole_read_outs(simulate: Any) -> None:
+def test_whole_i2c_read_outs_pass_their_testbench(simulate: Any) -> None:
     simulate(FULL_SIZE, "benches_i2c_whole", seed=1, harness=HERE / "i2c_full_frame.v")

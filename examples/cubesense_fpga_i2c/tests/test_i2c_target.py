@@ -28,7 +28,7 @@ from cubestack.hdl.flow.generate import rtlil_text
 DOCUMENT = Path(__file__).parents[1] / "README.md"
 
 
-def test_pins() -> None:
+def test_i2c_fpga_has_the_declared_pins() -> None:
     top = CubeSenseI2cFpga("sun")
     rtlil_text(top)  # a design must be used, Amaranth says
     ports = {port.name for pin in FPGA for port in pin.ports}
@@ -76,7 +76,7 @@ def rows(heading: str) -> list[list[str]]:
     return cells[2:]
 
 
-def test_documented_registers() -> None:
+def test_documentation_lists_every_register() -> None:
     wanted = [
         [
             f"0x{r.address:X}",
@@ -93,7 +93,7 @@ def test_documented_registers() -> None:
     assert rows("Registers") == wanted
 
 
-def test_documented_commands() -> None:
+def test_documentation_lists_every_active_command() -> None:
     for byte, *names in rows("Commands"):
         found = command_of(int(byte, 16))
         assert [found.sun.name.lower(), found.nadir.name.lower()] == names
@@ -101,7 +101,7 @@ def test_documented_commands() -> None:
     assert {int(row[0], 16) for row in rows("Commands")} == {*active, 3}
 
 
-def test_documented_tiles() -> None:
+def test_documented_tile_counts_match_the_design() -> None:
     found = {row[0]: row[1:] for row in rows("Tiles and pins")}
     count = count_tiles(CubeSenseI2cFpga("sun"))
     assert found["on I2C"] == ["53", *(str(n) for n in (*count, count.total))]
@@ -114,7 +114,7 @@ def milliseconds(text: str) -> float:
     return float(number) * {"us": 1e-3, "ms": 1.0, "s": 1e3}[unit]
 
 
-def test_documented_times() -> None:
+def test_documented_times_match_the_computed_times() -> None:
     """Periods exactly; times as rounded there."""
     size = FULL_SIZE
     wanted = {
@@ -135,7 +135,7 @@ def test_documented_times() -> None:
             assert milliseconds(time) == pytest.approx(exact, rel=5e-3), name
 
 
-def test_documented_addresses() -> None:
+def test_documentation_lists_every_i2c_address() -> None:
     text = DOCUMENT.read_text(encoding="utf-8")
     for address in (*ADDRESSES.values(), GROUP_ADDRESS):
         assert re.search(rf"0x{address:02X}\b", text)

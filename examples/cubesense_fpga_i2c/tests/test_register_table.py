@@ -29,7 +29,7 @@ STANDBY = Actions(Action.STANDBY, Action.STANDBY)
 BOTH_READ = Actions(Action.READ, Action.READ)
 
 
-def test_three_addresses_and_none_is_reserved() -> None:
+def test_i2c_addresses_are_distinct_and_not_reserved() -> None:
     addresses = {*ADDRESSES.values(), GROUP_ADDRESS}
     assert len(addresses) == 3
     assert all(0x08 <= address <= 0x77 for address in addresses)
@@ -49,11 +49,11 @@ def test_pointer_and_data_are_adjacent() -> None:
 
 
 @pytest.mark.parametrize("bits", [StatusBits, CommandBits])
-def test_bits_are_single_and_lowest(bits: type[StatusBits | CommandBits]) -> None:
+def test_status_and_command_bits_are_the_lowest_four(bits: type[StatusBits | CommandBits]) -> None:
     assert sorted(bit.value for bit in bits) == [1, 2, 4, 8]
 
 
-def test_commands_match_the_pins() -> None:
+def test_i2c_commands_match_the_fpga_pin_levels() -> None:
     """Every value: what the lines of table 6.4 do at these levels, EDGE low."""
     for byte in range(256):
         bits = CommandBits(byte & 0xF)
@@ -73,7 +73,7 @@ def test_command_bytes_round_trip() -> None:
     assert command_byte(STANDBY) == RESET_COMMAND
 
 
-def test_only_edge_rows_are_left_out() -> None:
+def test_i2c_commands_exclude_only_edge_rows() -> None:
     left_out = {row.actions for row in COMMANDS} - {row.actions for row in I2C_COMMANDS}
     assert left_out == {row.actions for row in COMMANDS if row.edge}
 
@@ -83,7 +83,7 @@ def test_rejects_invalid_commands() -> None:
         command_byte(Actions(Action.SEND_PICTURE, Action.SEND_PICTURE))
 
 
-def test_pointer_bytes() -> None:
+def test_pointer_bytes_encode_pixel_and_direction() -> None:
     assert pointer_bytes(0, 0) == bytes(3)
     assert pointer_bytes(639, 479) == bytes([0x07, 0x7E, 0x7F])
     assert pointer_bytes(639, 479, down=True) == bytes([0x87, 0x7E, 0x7F])

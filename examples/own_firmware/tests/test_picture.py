@@ -27,7 +27,7 @@ def image(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.slow
-def test_picture_is_stored_by_the_fpga(image: Path) -> None:
+def test_image_is_stored_by_the_fpga(image: Path) -> None:
     """Sum and brightest pixel are those of the bytes in the FPGA's memory."""
     with cubestack.open_device("cubestar", firmware=str(image)) as cubestar:
         port = cubestar.serial()

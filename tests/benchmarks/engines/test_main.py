@@ -61,7 +61,7 @@ def test_absent_engines_are_named_below_the_table(figures, capsys):
     assert "compiled is absent: install a C++ compiler" in captured.err
 
 
-def test_engine_with_a_wrong_picture_is_an_error(figures, capsys):
+def test_benchmark_fails_if_an_engine_stores_a_wrong_image(figures, capsys):
     figures({}, broken="cubestar-double")
     assert main([]) == 2
     assert "error: SRAM has 1 at row 0" in capsys.readouterr().err

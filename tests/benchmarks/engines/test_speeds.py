@@ -54,7 +54,7 @@ def test_cocotb_stores_the_sample_and_reports_failures():
 
 
 @pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
-def test_figures_are_positive(monkeypatch):
+def test_engine_speeds_are_positive(monkeypatch):
     names = ["compiled", "amaranth"]
     small = {name: ENGINES[name]._replace(lines=2, rounds=1) for name in names}
     monkeypatch.setattr(speeds, "ENGINES", small)

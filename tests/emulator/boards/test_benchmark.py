@@ -27,11 +27,11 @@ pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler
         lambda: pair.pair_scan_ms(pair.pair_with_cameras(), 1),
     ],
 )
-def test_figures_are_positive(figure):
+def test_board_benchmark_figures_are_positive(figure):
     assert 0 < figure() < float("inf")
 
 
-def test_the_measured_run_stores_a_frame():
+def test_benchmark_run_stores_a_frame():
     """The first line is joined in the middle, so the frame begins with the second."""
     _, engine = star.stored_frame(skipping=False)
     rng = np.random.default_rng(0)
@@ -42,7 +42,7 @@ def test_the_measured_run_stores_a_frame():
 
 
 @pytest.mark.parametrize("way", pair.STORES)
-def test_the_measured_stores_of_the_pair_end_with_the_frame(way):
+def test_benchmark_pair_stores_end_with_the_frame(way):
     engine = pair.pair_with_cameras()
     assert 0 < pair.pair_store_ms(engine, way, 2) < float("inf")
     assert all(engine.get_pin(pin) for pin in pair.STORES[way][1])

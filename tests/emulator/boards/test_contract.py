@@ -114,7 +114,7 @@ def test_scenes_change_while_boards_run(stack: ExitStack) -> None:
         boards["cubesense"].scene = SKY
 
 
-def test_lines_and_probes(stack: ExitStack) -> None:
+def test_boards_declare_their_lines_and_probes(stack: ExitStack) -> None:
     boards = powered(stack)
     latest = "sun_capture", "sun_detect", "nadir_capture", "nadir_detect"
     assert {name: [*board.uarts, *board.probes()] for name, board in boards.items()} == {

@@ -92,7 +92,7 @@ class Bus:
         return answers
 
 
-def test_a_master_reads_and_writes_its_camera() -> None:
+def test_i2c_master_reads_and_writes_camera_registers() -> None:
     bus = Bus()
     assert bus.write(0x09, 0x12, 0x34) == [(True,)] * 4
     bus.write(0x09)
@@ -116,7 +116,7 @@ def test_write_takes_effect_once_at_its_end() -> None:
     assert bus.camera.registers.peek(9) == 7
 
 
-def test_others_on_the_bus_and_a_camera_without_power_do_not_answer() -> None:
+def test_other_addresses_and_an_unpowered_camera_do_not_answer() -> None:
     bus = Bus()
     for address_byte in (0x40, 0x41):
         assert bus.say(OutgoingKind.I2C_START, address_byte) == (False,)
@@ -162,7 +162,9 @@ class Line:
         (0x3305, 8, "O", 2),
     ],
 )
-def test_usart_frames(processor: Any, frame: int, data: int, parity: Any, stops: float) -> None:
+def test_usart_frame_register_sets_the_line_format(
+    processor: Any, frame: int, data: int, parity: Any, stops: float
+) -> None:
     """EFM32GG Reference Manual, USART_FRAME: DATABITS, PARITY, STOPBITS."""
     line = Line(processor)
     line.memory[FRAMES[0][0]] = frame
@@ -176,7 +178,9 @@ def test_usart_frames(processor: Any, frame: int, data: int, parity: Any, stops:
     ("control", "parity", "stops"),
     [(0, "N", 1), (0b10000, "N", 2), (0b01000, "E", 1), (0b11100, "O", 2), (0b00010, "N", 1)],
 )
-def test_leuart_frame_format(processor: Any, control: int, parity: Any, stops: float) -> None:
+def test_leuart_control_register_sets_the_line_format(
+    processor: Any, control: int, parity: Any, stops: float
+) -> None:
     """LEUART_CTRL: DATABITS, PARITY, STOPBITS."""
     line = Line(processor)
     unit = next(n for n, (_, layout) in enumerate(FRAMES) if layout.name.startswith("LEUART"))
@@ -206,7 +210,7 @@ def test_nearby_rate_snaps_to_host_or_board_rate(processor: Any, baud: float, ta
     assert line.uart.form.baud == pytest.approx(taken, abs=1)
 
 
-def test_bytes_at_other_pins_are_not_on_the_line(processor: Any) -> None:
+def test_bytes_at_other_pins_are_ignored(processor: Any) -> None:
     line = Line(processor)
     line.send(0x41, 10, 9600, pin=TX + 1)
     assert line.uart.backlog == 0
@@ -225,7 +229,7 @@ def test_bytes_are_received_at_the_line_s_rate(processor: Any) -> None:
     assert processor.calls == ["give", "give"]
 
 
-def test_stretching_slave_is_polled_for_the_same_byte(processor: Any) -> None:
+def test_clock_stretching_slave_is_polled_for_the_same_byte(processor: Any) -> None:
     slave, machine, unit = SlaveWire(processor, SDA), processor.machine, 0x100 | SDA
     machine.replies += [None, None, 1, 1, 0, 0x5A]
     assert [slave.i2c_address(0x1A, True) for _ in range(3)] == [None, None, True]
@@ -243,7 +247,7 @@ def test_stretching_slave_is_polled_for_the_same_byte(processor: Any) -> None:
     assert processor.calls == ["catch_up", "wake"] * 6
 
 
-def test_stop_ends_the_polling(processor: Any) -> None:
+def test_i2c_stop_ends_the_polling_of_a_byte(processor: Any) -> None:
     slave, machine, unit = SlaveWire(processor, SDA), processor.machine, 0x100 | SDA
     machine.replies += [None]
     assert slave.i2c_write(7) is None
@@ -252,7 +256,7 @@ def test_stop_ends_the_polling(processor: Any) -> None:
     assert machine.given[1:] == [("i2c_slave_stop", unit), ("i2c_slave_read", unit)]
 
 
-def test_the_core_s_registers_can_be_turned_over_bit_by_bit(processor: Any) -> None:
+def test_core_register_bits_can_be_flipped(processor: Any) -> None:
     core = Core(processor)
     assert core.registers["r0"] == core.registers["pc"] == core.registers["xpsr"] == 32
     widths = {name: core.registers[name] for name in ("primask", "basepri", "faultmask", "control")}

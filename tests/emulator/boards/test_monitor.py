@@ -19,7 +19,7 @@ def monitor(engine: object) -> Monitor:
     return Monitor(board, Symbols(None))
 
 
-def test_pins_are_those_of_the_processor_and_the_outputs() -> None:
+def test_monitor_pins_lists_processor_and_output_pins() -> None:
     wiring = SimpleNamespace(mcu_pins=("ENABLE", "RNW"), output_pins=("ACK", "DATA"))
     levels = {"ENABLE": 1, "RNW": 0, "ACK": 1, "DATA": 0x5A}
     engine = SimpleNamespace(wiring=wiring, get_pin=levels.__getitem__)
@@ -48,7 +48,7 @@ def look(what: str, **variables: Symbol) -> list[RegisterValue]:
 
 
 @pytest.mark.parametrize("offset", [0, 1, 2, 3])
-def test_an_address_is_that_of_its_word(offset: int) -> None:
+def test_address_lookup_shows_the_word_that_contains_it(offset: int) -> None:
     for what in (hex(RAM + 8 + offset), str(RAM + 8 + offset)):
         assert look(what) == [RegisterValue("20000008", RAM + 8, {})]
 
@@ -60,7 +60,7 @@ def test_variable_covers_every_word_it_touches() -> None:
         assert found[0].name == "it 20000000"
 
 
-def test_a_register_has_its_fields_and_a_peripheral_all_registers() -> None:
+def test_register_lookup_shows_fields_and_all_registers_of_a_peripheral() -> None:
     assert {"CMU", "MSC", "USART0"} <= set(peripherals())
     for layout in LAYOUTS:
         for instance in layout.instances:
@@ -90,7 +90,7 @@ def test_rejects_unknown_addresses_and_names() -> None:
 LENGTHS = {region.start: region.length for region in REGIONS}
 
 
-def test_memories_are_as_large_as_the_part_s() -> None:
+def test_debugger_memory_map_matches_the_part() -> None:
     """EFM32GG Reference Manual, figure 5.2: RAM is in the code space too, and bit by bit."""
     assert LENGTHS[0] == FLASH_BYTES == 1 << 20
     assert LENGTHS[0x1000_0000] == LENGTHS[0x2000_0000] == RAM_BYTES == 128 * 1024
@@ -111,7 +111,7 @@ def test_each_peripheral_and_information_page_is_in_a_region() -> None:
 
 
 @pytest.mark.parametrize("count", [None, 1, 2])
-def test_each_fpga_s_memory_and_the_camera_are_beside_them(count: int | None) -> None:
+def test_debugger_windows_include_fpga_memories_and_camera_registers(count: int | None) -> None:
     registers = RegisterFile(mlx75412.REGISTERS)
     memories = [np.arange(size, dtype=np.uint8) for size in (200, 100)][: count or 0]
     engine = SimpleNamespace(memories={str(n): memory for n, memory in enumerate(memories)})
@@ -129,7 +129,7 @@ def test_each_fpga_s_memory_and_the_camera_are_beside_them(count: int | None) ->
     assert all(memory[3] == 0x63 for memory in memories)
 
 
-def test_the_camera_s_registers_can_be_read_only() -> None:
+def test_debugger_reads_but_does_not_write_camera_registers() -> None:
     registers = RegisterFile(mlx75412.REGISTERS)
     window = CameraWindow(registers)
     (first, *_) = mlx75412.REGISTERS["EXPOSURE"].addresses

@@ -57,7 +57,7 @@ class DoublerBoard(NodeBoard[Doubler, int]):
         return {"LAMP": lambda level: setattr(self, "lamp", level)}
 
 
-def test_pins_of_the_processor_lead_to_the_board() -> None:
+def test_processor_pins_reach_the_board() -> None:
     board = DoublerBoard(21)
     node = NodeClient(board.serial(), INTERFACE)
     node.command("Double")
@@ -76,7 +76,7 @@ def test_checking_a_program_leaves_the_board_unchanged() -> None:
     assert checked.rng.random() != unchecked.rng.random()
 
 
-def test_costs_must_have_the_operations_of_every_node() -> None:
+def test_cost_table_without_required_operations_is_rejected() -> None:
     class Poor(DoublerBoard):
         costs = CostTable("slow", 1_000_000, {"port_read": CORTEX_M3.operations["port_read"]})
 
@@ -94,7 +94,9 @@ def test_costs_must_have_the_operations_of_every_node() -> None:
     ],
 )
 @pytest.mark.parametrize("hz", [100_000, 400_000])
-def test_a_message_takes_its_bits(request_: CameraTransfer, bits: int, hz: int) -> None:
+def test_camera_transfer_takes_the_time_of_its_bits(
+    request_: CameraTransfer, bits: int, hz: int
+) -> None:
     camera = Mt9m001(SkyScene.pointing(80.0, 0.0))
     bus = I2cCameraBus(camera, 0x5D, hz)
     assert bus.transfer_ps(request_) == bits * 10**12 // hz
@@ -108,7 +110,7 @@ def test_a_camera_answers_to_its_own_address_only() -> None:
     assert I2cCameraBus(camera, 0x5C, 100_000).transfer(version, 0) is None
 
 
-def test_a_program_s_line_clock_and_sleep() -> None:
+def test_node_peripherals_expose_uptime_backlog_and_wake() -> None:
     kernel, woken = Kernel(), []
     uart = Uart(kernel, 10_000, lambda _byte: None, lambda: None, silence_bytes=100)
     processor = SimpleNamespace(wake=lambda: woken.append(kernel.now))

@@ -28,12 +28,12 @@ def milliwatts(table: PowerTable, on: set[str], **states: str) -> float:
         ({"processor": "run", "memory": "transfer", "fpga": "reading"}, 81.81),
     ],
 )
-def test_cubestar_draws_table_6_2(states: dict[str, str], ma: float) -> None:
+def test_cubestar_power_matches_published_table_6_2(states: dict[str, str], ma: float) -> None:
     found = milliwatts(CUBESTAR_POWER, {"memory", "imager"}, **states)
     assert found == pytest.approx(3.3 * ma, abs=0.01)
 
 
-def test_cubestar_s_parts_and_comparators() -> None:
+def test_cubestar_currents_and_comparator_limits_match_the_documents() -> None:
     parts = CUBESTAR_POWER.parts
     assert parts["leds"].ma["on"] * 3.3 == pytest.approx(396.2 - 350)  # section 6.3
     # Appendix E: 200 uA/MHz running, 50 uA/MHz asleep, at 48 MHz.
@@ -62,7 +62,7 @@ NADIR = {"nadir_fpga": "imaging", "sram2": "active"}
         (SRAMS | CAMERAS, SUN | NADIR, 432.4, 1),
     ],
 )
-def test_cubesense_draws_table_7_1(
+def test_cubesense_power_matches_published_table_7_1(
     on: set[str], states: dict[str, str], mw: float, within: float
 ) -> None:
     found = milliwatts(CUBESENSE_POWER, on, **({"processor": "on"} | states))

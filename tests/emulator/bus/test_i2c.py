@@ -40,7 +40,7 @@ def failure(kernel: Kernel, bus: I2cBus, *messages: I2cMessage) -> tuple[int, st
         ([I2cMessage(0x1A, bytearray(1)), I2cMessage(0x1A, read=8)], 1 + 18 + 1 + 9 + 72 + 1),
     ],
 )
-def test_time_on_the_wire(hz, messages, bits):
+def test_i2c_transfers_take_their_wire_time(hz, messages, bits):
     """A start and a stop of one bit each, nine bits a byte, the address included."""
     kernel, bus = make(hz, x1A=Memory())
     perform(kernel, bus, *messages)
@@ -56,7 +56,7 @@ def test_repeated_start_joins_a_write_and_a_read():
 
 
 @pytest.mark.parametrize(("probe_read", "direction"), [(False, "write"), (True, "read")])
-def test_probe_only_addresses(probe_read, direction):
+def test_i2c_probe_sends_only_the_address(probe_read, direction):
     kernel, bus = make(x1A=(target := Memory()))
     perform(kernel, bus, I2cMessage(0x1A, probe_read=probe_read))
     assert target.calls == [direction, "stop"]
@@ -128,7 +128,7 @@ def test_rejects_reserved_and_used_addresses(address, text):
         bus.attach(address, Memory())
 
 
-def test_a_target_moves():
+def test_i2c_target_moves_to_a_free_valid_address():
     target = Memory()
     _, bus = make(x1A=target)
     bus.move(0x1A, 0x1A)
@@ -164,7 +164,7 @@ def test_transfer_times_out_when_the_clock_is_held_low():
     assert target.calls[-1] == "stop"
 
 
-def test_general_call_reaches_those_that_listen():
+def test_general_call_reaches_listening_targets_only():
     kernel, bus = make(x1A=(deaf := Memory()))
     nobody = (errno.ENXIO, "no I2C device answers at 0x00")
     assert failure(kernel, bus, I2cMessage(0, bytearray([6]))) == nobody
@@ -179,7 +179,7 @@ def test_general_call_reaches_those_that_listen():
 
 @pytest.mark.parametrize("length", [1, 32])
 @pytest.mark.parametrize("rest", [1, 2])  # the length alone, or a checksum as well
-def test_block_brings_its_length(length, rest):
+def test_smbus_block_read_takes_the_length_from_its_first_byte(length, rest):
     kernel, bus = make(x1A=(target := Memory()))
     target.i2c_read = iter([length, *range(100, 200)]).__next__
     reading = I2cMessage(0x1A, read=rest, block=True)

@@ -97,7 +97,7 @@ def test_backlog_counts_the_byte_on_the_line(desk):
 
 
 @pytest.mark.parametrize("said", [[], [b"only the device talks"]])
-def test_nothing_heard_is_no_silence(desk, said):
+def test_silence_is_reported_only_after_received_bytes(desk, said):
     blocks = []
     desk.uart.line = lambda data, *_times: blocks.append(data)
     for data in (b"", *said):
@@ -150,7 +150,7 @@ def stepped(data: bytes, sender: LineFormat, receiver: LineFormat) -> list[int]:
 
 
 @given(st.binary(max_size=20), FORMATS)
-def test_equal_ends_understand_each_other(data, form):
+def test_equal_line_formats_transfer_all_bytes(data, form):
     mask = (1 << form.data_bits) - 1
     assert heard(data, form, form) == [(byte & mask, False, False) for byte in data]
 
@@ -163,7 +163,7 @@ def test_small_rate_differences_are_tolerated(data, difference):
 
 @settings(deadline=None, max_examples=30)
 @given(st.binary(max_size=12), st.sampled_from([3, 5, 7]), st.booleans())
-def test_garbage_is_what_a_stepping_receiver_finds(data, ratio, faster):
+def test_garbled_bytes_equal_those_of_a_sampling_receiver(data, ratio, faster):
     """Odd ratios: no sample falls on an edge."""
     ends = LineFormat(9600 * ratio), LineFormat(9600)
     sender, receiver = ends if faster else ends[::-1]
@@ -219,7 +219,7 @@ def desk_of(host: LineFormat) -> Desk:
 
 
 @given(st.binary(max_size=12), FORMATS, st.lists(st.integers(0, 10**9), max_size=4))
-def test_device_hears_what_its_receiver_makes_of_it(data, form, pauses):
+def test_device_receives_bytes_as_its_receiver_samples_them(data, form, pauses):
     """In one piece; and, when only a bit too slow, whatever the pauses of the writer."""
     desk = desk_of(form)
     desk.uart.host_writes(data)
@@ -237,7 +237,7 @@ def test_device_hears_what_its_receiver_makes_of_it(data, form, pauses):
     assert desk.data == data[: len(pauses)]
 
 
-def test_rate_of_a_slow_host_is_its_own():
+def test_slow_host_occupies_the_line_at_its_own_rate():
     desk = desk_of(LineFormat(300))
     desk.uart.host_writes(bytes(10))
     desk.kernel.advance_to(PS_PER_S // 3)

@@ -91,7 +91,7 @@ def test_saves_only_values_that_differ_from_defaults(tmp_path: Path) -> None:
     assert table == {"kind": "earth-sun", "nadir": [0, 0, 1], "sun": [0, 0, -1]}
 
 
-def test_saves_photographs_too(tmp_path: Path) -> None:
+def test_scene_table_contains_an_image_scene(tmp_path: Path) -> None:
     Image.new("L", (1100, 700), 9).save(tmp_path / "p.png")
     text = 'kind = "picture"\nfile = "p.png"\ncrop = [3, 4]\ntemperature_c = 3'
     table = SKY.table(load_scene(save(tmp_path, text), CONDITION))
@@ -99,7 +99,7 @@ def test_saves_photographs_too(tmp_path: Path) -> None:
     assert table == place | {"crop": [3, 4], "temperature_c": 3.0}
 
 
-def test_the_sky_is_seen_where_the_camera_looks(tmp_path: Path) -> None:
+def test_sky_map_shows_the_field_where_the_camera_points(tmp_path: Path) -> None:
     text = 'kind = "sky"\nra_deg = 30\ndec_deg = 20\nroll_deg = 90\nrate_deg_s = [0, 1, 0]'
     view = load(save(tmp_path, text))
     sky_map = SKY.sky_map(view, 10 * 10**12)
@@ -114,7 +114,7 @@ def test_the_sky_is_seen_where_the_camera_looks(tmp_path: Path) -> None:
     assert sky_map.stars
 
 
-def test_an_outline_is_the_border_of_the_picture() -> None:
+def test_outline_is_the_border_of_the_image_or_of_the_round_field() -> None:
     border = outline(LENS)
     pixels = LENS.project(border)
     on_border = np.isclose(pixels[:, 0], -0.5) | np.isclose(pixels[:, 0], LENS.columns - 0.5)
@@ -124,7 +124,7 @@ def test_an_outline_is_the_border_of_the_picture() -> None:
     assert round_field.max() == pytest.approx(double_gauss().field_stop_deg / 2)
 
 
-def test_hazards_say_where_bodies_are(tmp_path: Path) -> None:
+def test_sky_map_shows_the_bodies_of_hazards(tmp_path: Path) -> None:
     text = (
         'kind = "sky"\nra_deg = 0\ndec_deg = 0\n[hazards.moon]\ndirection = [90, 0]\n'
         "[hazards.earth-limb]\nnadir = [0, -90]\nsun = [1, 0, 0]\naltitude_km = 750\n"
@@ -137,7 +137,7 @@ def test_hazards_say_where_bodies_are(tmp_path: Path) -> None:
     np.testing.assert_allclose(bodies["Sun"].direction, [1, 0, 0])
 
 
-def test_earth_and_sun_stand_in_the_satellite_s_axes(tmp_path: Path) -> None:
+def test_sky_map_shows_earth_and_sun_in_satellite_axes(tmp_path: Path) -> None:
     view = load(save(tmp_path, HARD))
     sky_map = EARTH.sky_map(view, 10**12)
     assert [one.name for one in sky_map.bodies[:3]] == ["Earth", "Sun", "Moon"]

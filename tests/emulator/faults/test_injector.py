@@ -75,7 +75,7 @@ def test_fault_is_active_for_its_duration(desk: Desk) -> None:
     assert desk.deaf
 
 
-def test_fault_cleared_before_its_start_never_acts(desk: Desk) -> None:
+def test_fault_cleared_before_its_start_has_no_effect(desk: Desk) -> None:
     desk.faults.inject(UartDrop(), at_s=1.0, for_s=1.0)
     kept = desk.faults.inject("latch-up", target="memory", at_s=1.0)
     desk.faults.clear(kept)
@@ -87,7 +87,7 @@ def test_fault_cleared_before_its_start_never_acts(desk: Desk) -> None:
     assert desk.faults.events == 0
 
 
-def test_clearing_all_ends_each(desk: Desk) -> None:
+def test_clear_without_arguments_ends_all_faults(desk: Desk) -> None:
     both = [desk.faults.inject("uart-drop"), desk.faults.inject("uart-delay")]
     desk.to(0.25)
     desk.faults.clear()
@@ -95,7 +95,7 @@ def test_clearing_all_ends_each(desk: Desk) -> None:
     assert not desk.deaf
 
 
-def test_a_latch_up_happens_at_its_instant(desk: Desk) -> None:
+def test_latch_up_begins_at_its_time_and_clear_does_not_heal_it(desk: Desk) -> None:
     desk.faults.inject("latch-up", target="memory", at_s=0.5, extra_ma=11.0)
     desk.to(0.4999)
     assert desk.power.current_ma() == pytest.approx(IDLE_MA)

@@ -58,7 +58,7 @@ def test_upsets_end_and_repeat_with_the_seed(per_s: float) -> None:
     assert parts[0].run(1.0) == counts[0]
 
 
-def test_one_bit_is_turned_over_and_back() -> None:
+def test_flip_bit_inverts_one_bit() -> None:
     memory = np.zeros(4, np.uint8)
     parts.flip_bit(memory, 13)
     assert memory.tolist() == [0, 0x20, 0, 0]
@@ -66,7 +66,7 @@ def test_one_bit_is_turned_over_and_back() -> None:
     assert not memory.any()
 
 
-def test_the_rate_is_that_of_each_bit_and_the_seed_decides() -> None:
+def test_flip_bits_applies_its_rate_per_bit_and_repeats_with_the_seed() -> None:
     first, again = np.zeros(200_000, np.uint8), np.zeros(200_000, np.uint8)
     count = parts.flip_bits(first, 1e-3, np.random.default_rng(1))
     assert count == int(np.unpackbits(first).sum()) == pytest.approx(1600, rel=0.1)
@@ -103,7 +103,7 @@ class Core:
         self.faults.begin(injection)
 
 
-def test_a_core_s_bit_is_the_one_that_was_named() -> None:
+def test_core_flip_hits_the_named_register_bit() -> None:
     core = Core()
     core.hit(CoreFlip(register="pc", bit=20))
     core.hit(CoreFlip(register="primask", bit=20))  # which has only one
@@ -122,7 +122,7 @@ def test_core_bit_is_drawn_from_all_registers() -> None:
     assert len({bit for _, bit in core.flipped}) > 20
 
 
-def test_a_core_s_upsets_come_at_the_rate_of_its_bits_until_they_end() -> None:
+def test_core_upsets_occur_at_the_rate_per_bit_until_the_fault_ends() -> None:
     core = Core()
     injection = Injection(0, CoreUpsets(rate=10.0), "core", 0, None, 1)
     core.faults.begin(injection)

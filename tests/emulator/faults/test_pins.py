@@ -65,7 +65,7 @@ def waiting(desk_of):
 @example([AckLate(delay_us=10), AckLost()])  # late, and never seen
 @example([AckLate(delay_us=10), AckStuck(level=0)])
 @given(FAULTS)
-def test_a_wait_ends(waiting, faults):
+def test_wait_for_acknowledge_ends_under_any_pin_faults(waiting, faults):
     assert waiting(faults) is sees(faults)
 
 

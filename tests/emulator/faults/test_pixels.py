@@ -79,14 +79,14 @@ def near(found: list[Clock], expected: list[Clock]) -> None:
 CLEAN = list(clocks(Camera(), 3 * FRAME_PS))
 
 
-def test_without_faults_nothing_changes() -> None:
+def test_pixel_stream_is_unchanged_without_faults() -> None:
     assert list(clocks(faulty()[0], 3 * FRAME_PS)) == CLEAN
     near(list(clocks(faulty(table.ClockLost(rate=0.0, row=1))[0], 3 * FRAME_PS)), CLEAN)
 
 
 @pytest.mark.parametrize("column", range(COLUMNS))
 @pytest.mark.parametrize("row", [0, 2, ROWS - 1])
-def test_a_lost_clock_is_one_edge_less(row: int, column: int) -> None:
+def test_lost_clock_removes_one_pixel_edge(row: int, column: int) -> None:
     source, log = faulty(table.ClockLost(row=row, column=column))
     lost = {n * (ROWS * LINE + BLANK) + row * LINE + column for n in range(3)}
     expected = [clock for number, clock in enumerate(CLEAN) if number not in lost]
@@ -95,7 +95,7 @@ def test_a_lost_clock_is_one_edge_less(row: int, column: int) -> None:
 
 
 @pytest.mark.parametrize("column", range(COLUMNS))
-def test_an_extra_clock_is_half_a_period_later(column: int) -> None:
+def test_extra_clock_comes_half_a_period_later(column: int) -> None:
     source, _ = faulty(table.ClockExtra(row=2, column=column))
     expected = list(CLEAN)
     for n in reversed(range(3)):
@@ -105,7 +105,7 @@ def test_an_extra_clock_is_half_a_period_later(column: int) -> None:
     near(list(clocks(source, 3 * FRAME_PS)), expected)
 
 
-def test_a_missing_line_is_blank() -> None:
+def test_missing_line_is_read_as_zeros() -> None:
     source, _ = faulty(table.LineMissing(row=3))
     expected = []
     for number, clock in enumerate(CLEAN):
@@ -114,7 +114,7 @@ def test_a_missing_line_is_blank() -> None:
     near(list(clocks(source, 3 * FRAME_PS)), expected)
 
 
-def test_faults_of_several_lines_add_up() -> None:
+def test_pixel_faults_on_several_lines_combine() -> None:
     source, log = faulty(
         table.ClockLost(row=1, column=1),
         table.LineMissing(row=3),
@@ -125,7 +125,7 @@ def test_faults_of_several_lines_add_up() -> None:
     assert log[:3] == ["line 1, column 1", "line 3", "line 4, column 0"]
 
 
-def test_drawn_places_repeat_with_the_seed() -> None:
+def test_random_fault_positions_repeat_with_the_seed() -> None:
     logs = []
     for seed in (1, 1, 2):
         source, log = faulty(table.ClockLost(), seed=seed)
@@ -139,7 +139,7 @@ def rendered(source: FaultySource) -> np.ndarray:
     return source.segment_at(0).pixels()
 
 
-def test_pixels() -> None:
+def test_pixel_and_column_faults_change_their_pixels() -> None:
     clean = Camera().picture
     expected = clean.copy()
     expected[1, 2], expected[3, 4], expected[:, 5] = 255, 0, 9
@@ -157,7 +157,7 @@ def test_blooming_goes_along_the_column() -> None:
     np.testing.assert_array_equal(rendered(source), expected)
 
 
-def test_lines_outside_of_the_time_are_good() -> None:
+def test_pixel_fault_affects_only_lines_within_its_time() -> None:
     source, _ = faulty(table.ColumnDefect(x=0))
     source.injections[0].start_ps = int(LINE * PERIOD)
     source.injections[0].end_ps = int(3 * LINE * PERIOD)

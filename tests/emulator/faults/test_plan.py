@@ -26,7 +26,7 @@ kind = "ack-lost"
 """
 
 
-def test_a_plan(tmp_path: Path) -> None:
+def test_fault_plan_is_loaded_from_toml(tmp_path: Path) -> None:
     path = tmp_path / "plan.toml"
     path.write_text(PLAN)
     plan = load_plan(path)
@@ -40,7 +40,9 @@ def test_a_plan(tmp_path: Path) -> None:
 
 
 @pytest.mark.filterwarnings("default::FutureWarning")
-def test_old_names_of_times_still_work_with_a_warning(recwarn: pytest.WarningsRecorder) -> None:
+def test_deprecated_plan_time_keys_still_work_with_a_warning(
+    recwarn: pytest.WarningsRecorder,
+) -> None:
     old = PLAN.replace("at_s", "at").replace("for_s", "for")
     assert parse_plan(old) == parse_plan(PLAN)
     assert [str(one.message) for one in recwarn] == [
@@ -93,7 +95,7 @@ DOCUMENT = Path(__file__).parents[3] / "docs" / "reference" / "fault-kinds.md"
 
 
 @pytest.mark.parametrize("kind", table.FAULTS)
-def test_a_fault_is_declared_in_full(kind: str) -> None:
+def test_every_fault_has_a_kind_defaults_and_a_description(kind: str) -> None:
     fault = table.FAULTS[kind]
     assert fault.kind == kind
     assert fault.effect().endswith(".")

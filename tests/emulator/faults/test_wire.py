@@ -84,7 +84,7 @@ def test_bytes_after_a_delayed_one_are_delayed_too_and_delays_do_not_add_up() ->
     assert line.both() == (expected, expected)
 
 
-def test_an_idle_fault_leaves_blocks_whole() -> None:
+def test_inactive_fault_does_not_split_blocks() -> None:
     line = Line()
     blocks: list[bytes] = []
     line.uart.line = lambda data, _first_ps, _byte_ps: blocks.append(data)
@@ -93,7 +93,7 @@ def test_an_idle_fault_leaves_blocks_whole() -> None:
     assert blocks == [SENT]
 
 
-def test_a_rate_is_a_share_and_repeats_with_the_seed() -> None:
+def test_fault_rate_is_a_share_of_bytes_and_repeats_with_the_seed() -> None:
     logs = []
     for seed in (1, 1, 2):
         line = Line(seed)
@@ -105,7 +105,7 @@ def test_a_rate_is_a_share_and_repeats_with_the_seed() -> None:
     assert len(logs[0]) == pytest.approx(0.25 * 50 * 2 * len(SENT), rel=0.15)
 
 
-def test_a_tap_at_the_device_hears_what_the_device_does() -> None:
+def test_device_tap_sees_corrupted_bytes_like_the_device() -> None:
     line = Line()
     line.inject(UartCorrupt(mask=1, direction="to-device"))
     tapped: list[int] = []

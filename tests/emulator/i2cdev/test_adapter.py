@@ -18,7 +18,7 @@ BIT_PS = 2_500_000
 AGAIN = -errno.EAGAIN
 
 
-def test_reports_ends_in_virtual_time(kernel, adapter):
+def test_adapter_reports_completions_in_virtual_time(kernel, adapter):
     told: list[tuple[int, int]] = []
     for _ in range(2):
         adapter.submit([I2cMessage(0x1A, read=1)], lambda result: told.append((result, kernel.now)))
@@ -29,7 +29,7 @@ def test_reports_ends_in_virtual_time(kernel, adapter):
     assert (adapter.busy, adapter.answered) == (False, 2)
 
 
-def test_ends_that_are_held(kernel, adapter):
+def test_held_completions_are_released_at_their_wire_time(kernel, adapter):
     told: list[int] = []
     adapter.holding = True
     for _ in range(2):
@@ -50,7 +50,9 @@ def test_ends_that_are_held(kernel, adapter):
     ("retries", "timeout", "tries", "result"),
     [(0, 100, 1, AGAIN), (2, 100, 3, AGAIN), (9, 100, 4, 0), (9, 0, 1, AGAIN)],
 )
-def test_a_lost_bus_is_tried_again(kernel, bus, adapter, retries, timeout, tries, result):
+def test_lost_arbitration_is_retried_within_retries_and_timeout(
+    kernel, bus, adapter, retries, timeout, tries, result
+):
     """As Linux's core does for drivers that report EAGAIN; both settings by ioctl."""
     plain, tried = bus.transfer, []
 
@@ -86,7 +88,7 @@ def outcome(kernel, adapter, registers, run):
 
 
 @pytest.mark.parametrize(("patience", "steps"), [(0, 1), (0, 5), (1, 0), (1, 1), (3, 7), (100, 0)])
-def test_driven_transfers_are_the_same(patience, steps):
+def test_driven_transfers_equal_scheduled_transfers(patience, steps):
     """Also when the kernel is run by others between two drives."""
 
     def make():
@@ -111,7 +113,7 @@ def test_driven_transfers_are_the_same(patience, steps):
     assert outcome(kernel, adapter, registers, run) == expected
 
 
-def test_a_drive_without_a_transfer(kernel, adapter):
+def test_driven_adapter_begins_one_transfer_per_drive(kernel, adapter):
     adapter.driven = True
     assert not adapter.begins_transfer
     adapter.drive(lambda: True)

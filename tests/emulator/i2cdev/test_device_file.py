@@ -50,7 +50,9 @@ def rdwr(ask: Ask, *messages: linux.RdwrMessage) -> tuple[int, list[bytes]]:
     ("ten_bit", "address", "result"),
     [(0, 0x7F, 0), (0, 0x80, -errno.EINVAL), (1, 0x3FF, 0), (1, 0x400, -errno.EINVAL)],
 )
-def test_address(ask: Ask, file: DeviceFile, number, ten_bit, address, result):
+def test_slave_ioctl_sets_the_address_within_its_range(
+    ask: Ask, file: DeviceFile, number, ten_bit, address, result
+):
     ioctl(ask, linux.Ioctl.TENBIT, ten_bit)
     assert ioctl(ask, number, address) == (result, b"")
     assert file.address == (0x1A if result else address)
@@ -65,25 +67,25 @@ def test_address(ask: Ask, file: DeviceFile, number, ten_bit, address, result):
         (linux.Ioctl.FUNCS, 0, (0, FUNCTIONS.to_bytes(8, "little"))),
     ],
 )
-def test_other_requests(ask: Ask, number, argument, answer):
+def test_ioctl_answers_other_requests_as_linux(ask: Ask, number, argument, answer):
     assert ioctl(ask, number, argument) == answer
 
 
-def test_the_timeout_is_in_units_of_ten_milliseconds(ask: Ask, adapter: I2cAdapter):
+def test_timeout_is_in_units_of_ten_milliseconds(ask: Ask, adapter: I2cAdapter):
     """linux/i2c-dev.h; retries are a plain number."""
     ioctl(ask, linux.Ioctl.TIMEOUT, 3)
     ioctl(ask, linux.Ioctl.RETRIES, 4)
     assert (adapter.timeout_ps, adapter.retries) == (30 * 10**9, 4)
 
 
-def test_write_then_read(ask: Ask, registers):
+def test_device_file_write_then_read_returns_register_data(ask: Ask, registers):
     assert ask(linux.Call.WRITE, b"\x20\xaa\xbb") == (3, b"")
     assert ask(linux.Call.WRITE, b"\x1f") == (1, b"")
     assert ask(linux.Call.READ, linux.pack_read(4)) == (4, b"\x1f\xaa\xbb\x22")
     assert registers.log == [[0x20, 0xAA, 0xBB], -1, [0x1F], -1, 4, -1]
 
 
-def test_long_ones_are_cut(ask: Ask, registers):
+def test_transfers_longer_than_8192_bytes_are_truncated(ask: Ask, registers):
     result, data = ask(linux.Call.READ, linux.pack_read(2**63))
     assert (result, len(data)) == (8192, 8192)
     registers.pointer = -8191  # the first byte sets it, so nothing is refused
@@ -92,13 +94,13 @@ def test_long_ones_are_cut(ask: Ask, registers):
     assert len(registers.log[-2]) == 8192
 
 
-def test_nothing_to_transfer_is_a_probe(ask: Ask, registers):
+def test_zero_length_transfer_is_a_probe(ask: Ask, registers):
     assert ask(linux.Call.WRITE, b"") == (0, b"")
     assert ask(linux.Call.READ, linux.pack_read(0)) == (0, b"")
     assert registers.log == [[], -1, 0, -1]
 
 
-def test_refusals(ask: Ask, file: DeviceFile):
+def test_device_file_returns_linux_errors_for_refused_bytes(ask: Ask, file: DeviceFile):
     assert ask(linux.Call.WRITE, b"\xf1\x00") == (-errno.EIO, b"")
     file.address = 0x30
     for ten_bit, code in ((0, -errno.ENXIO), (1, -errno.EOPNOTSUPP)):
@@ -107,7 +109,7 @@ def test_refusals(ask: Ask, file: DeviceFile):
         assert ask(linux.Call.READ, linux.pack_read(1)) == (code, b"")
 
 
-def test_errors_of_another_driver(kernel, bus):
+def test_device_file_returns_the_error_numbers_of_the_chosen_driver(kernel, bus):
     file = DeviceFile(
         I2cAdapter(kernel, bus, address_errno=errno.EREMOTEIO, data_errno=errno.EBUSY)
     )
@@ -119,7 +121,7 @@ def test_errors_of_another_driver(kernel, bus):
     assert [linux.split_reply(reply)[0] for reply in replies] == [-errno.EREMOTEIO, -errno.EBUSY]
 
 
-def test_stretched_clock_delays(ask: Ask, kernel, registers):
+def test_clock_stretching_delays_the_call_or_times_out(ask: Ask, kernel, registers):
     ask(linux.Call.READ, linux.pack_read(1))
     plain = kernel.now
     registers.busy_reads = 7
@@ -129,7 +131,7 @@ def test_stretched_clock_delays(ask: Ask, kernel, registers):
     assert ask(linux.Call.READ, linux.pack_read(1)) == (-errno.ETIMEDOUT, b"")
 
 
-def test_combined(ask: Ask, registers):
+def test_rdwr_combines_messages_without_a_stop_between(ask: Ask, registers):
     messages = (
         linux.RdwrMessage(0x1A, 0, 2, b"\x10\x99"),
         linux.RdwrMessage(0x1A, 0, 1, b"\x10"),
@@ -165,11 +167,11 @@ def test_combined(ask: Ask, registers):
         ),
     ],
 )
-def test_combined_errors(ask: Ask, messages, code):
+def test_rdwr_errors_have_the_linux_codes(ask: Ask, messages, code):
     assert rdwr(ask, *messages) == (-code, [])
 
 
-def test_length_from_the_device(ask: Ask):
+def test_rdwr_block_read_takes_its_length_from_the_device(ask: Ask):
     messages = (
         linux.RdwrMessage(0x1A, 0, 1, b"\x05"),
         linux.RdwrMessage(0x1A, LENGTH_FROM_DEVICE, 33, b"\x01"),
@@ -190,7 +192,7 @@ def test_length_from_the_device(ask: Ask):
         (0, linux.SmbusSize.BLOCK_PROCESS_CALL, bytes([33]) + bytes(33)),
     ],
 )
-def test_smbus_arguments(ask: Ask, direction, size, data):
+def test_invalid_smbus_arguments_are_refused(ask: Ask, direction, size, data):
     body = linux.pack_smbus(linux.SmbusCall(direction, 0, size, data))
     assert ask(linux.Call.SMBUS, body) == (-errno.EINVAL, b"")
 
@@ -206,7 +208,7 @@ def test_smbus_reply_has_what_the_transaction_uses(ask: Ask):
     ) == (0, b"")
 
 
-def test_checksums_are_switched(ask: Ask, registers):
+def test_pec_ioctl_switches_checksums(ask: Ask, registers):
     write = linux.pack_smbus(
         linux.SmbusCall(0, 0x40, linux.SmbusSize.BYTE_DATA, bytes([7]) + bytes(33))
     )
@@ -223,6 +225,6 @@ def test_checksums_are_switched(ask: Ask, registers):
     "call", [linux.Call.IOCTL, linux.Call.RDWR, linux.Call.SMBUS, linux.Call.READ]
 )
 @pytest.mark.parametrize("body", [b"x", b"\xff" * 13])
-def test_nonsense_is_a_value_error(file: DeviceFile, call, body):
+def test_malformed_calls_raise_value_error(file: DeviceFile, call, body):
     with pytest.raises(ValueError, match=r"must be|breaks off"):
         file.perform(call, body, lambda _reply: None)

@@ -26,11 +26,11 @@ NODE = DeviceNode(7)
         ("", None),
     ],
 )
-def test_paths(path, found):
+def test_device_paths_are_recognised(path, found):
     assert (NODE.find(path, os.getpid(), None) if NODE.may_match(path) else None) is found
 
 
-def test_relative_paths(monkeypatch):
+def test_relative_device_paths_are_recognised(monkeypatch):
     monkeypatch.chdir("/dev")
     assert NODE.find("i2c-7", os.getpid(), None) is Found.DEVICE
     assert NODE.find("./i2c-7", os.getpid(), -100) is Found.DEVICE
@@ -44,7 +44,7 @@ def test_relative_paths(monkeypatch):
 
 
 @pytest.mark.skipif(ctypes.sizeof(ctypes.c_void_p) != 8, reason="structures of 64-bit machines")
-def test_stat_is_laid_out_as_the_kernel_does():
+def test_stat_structure_has_the_kernel_layout():
     """The fields of a real struct stat, found at their places in the one made up."""
     made = NODE.stat(compact=False)
     device, inode, links, mode, owner, group, _, number = struct.unpack_from("=QQQIIIIQ", made)
@@ -94,7 +94,7 @@ def test_statx_equals_that_of_a_real_device() -> None:
     assert DeviceNode(8).statx() != NODE.statx()
 
 
-def test_listing_is_what_i2c_tools_read():
+def test_device_node_listing_has_the_i2c_tools_format():
     number, kind, name, _ = NODE.listing.split("\t")
     assert (number, kind.strip()) == ("i2c-7", "i2c")
     assert "cubestack" in name

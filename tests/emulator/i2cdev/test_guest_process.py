@@ -26,14 +26,14 @@ def start(*command: str) -> None:
     program.start_filtered(command, {}, DeviceNode(7), nobody)
 
 
-def test_an_unknown_machine(monkeypatch):
+def test_unsupported_machine_raises_route_error(monkeypatch):
     monkeypatch.setattr(program, "native_abi", lambda: None)
     with pytest.raises(program.RouteError, match=r"system calls of .* are not supported"):
         start("true")
 
 
 @needs_abi
-def test_memory_out_of_reach(monkeypatch):
+def test_unreadable_guest_memory_raises_route_error(monkeypatch):
     refuse = Mock(side_effect=PermissionError(errno.EPERM, os.strerror(errno.EPERM)))
     monkeypatch.setattr(program, "read_memory", refuse)
     with pytest.raises(program.RouteError, match=r"no access to the program's memory \(Operation"):
@@ -41,13 +41,13 @@ def test_memory_out_of_reach(monkeypatch):
 
 
 @needs_abi
-def test_a_filter_that_the_kernel_does_not_take(monkeypatch):
+def test_refused_seccomp_filter_raises_route_error(monkeypatch):
     monkeypatch.setattr(program, "make_filter", lambda _abi, _numbers: bytes(8))
     with pytest.raises(program.RouteError, match=r"the kernel refuses a seccomp listener \("):
         start("true")
 
 
-def test_exit_codes(tmp_path):
+def test_guest_exit_status_includes_signals(tmp_path):
     for script, code in (("exit 3", 3), ("kill -9 $$", 128 + 9)):
         running = program.start_preloaded(["sh", "-c", script], {}, tmp_path / "none.so")
         assert (running.exit_code, running.ended, running.watched()) == (code, True, [])
@@ -66,7 +66,7 @@ needs_c = pytest.mark.skipif(shim.find_c_compiler() is None, reason="no C compil
 
 
 @needs_c
-def test_built_once_of_each_source(tmp_path, monkeypatch):
+def test_shim_is_built_once_per_source(tmp_path, monkeypatch):
     library = shim.shim_library(tmp_path)
     log = library.with_suffix(".log").read_text()
     assert len(log.splitlines()) == 1, log  # the command, and no warning
@@ -79,7 +79,7 @@ def test_built_once_of_each_source(tmp_path, monkeypatch):
     assert shim.shim_library(tmp_path) != library
 
 
-def test_a_compiler_that_fails(tmp_path, monkeypatch):
+def test_failed_compiler_raises_an_error_that_names_its_log(tmp_path, monkeypatch):
     compiler = tmp_path / "cc"
     compiler.write_text("#!/bin/sh\necho cannot; exit 1\n")
     compiler.chmod(compiler.stat().st_mode | stat.S_IXUSR)
@@ -90,14 +90,14 @@ def test_a_compiler_that_fails(tmp_path, monkeypatch):
     assert "cannot" in Path(log).read_text()
 
 
-def test_without_a_compiler(tmp_path, monkeypatch):
+def test_missing_c_compiler_raises_no_compiler_error(tmp_path, monkeypatch):
     monkeypatch.setattr(shim, "find_c_compiler", lambda: None)
     with pytest.raises(NoCompilerError, match=r"no C compiler \(cc, gcc, clang"):
         shim.shim_library(tmp_path)
 
 
 @needs_c
-def test_a_cache_that_can_not_be_written(tmp_path):
+def test_unwritable_cache_folder_raises_compiler_error(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(CompilerError, match="can not use the cache folder"):
         shim.shim_library(tmp_path / "file" / "cache")
@@ -105,7 +105,7 @@ def test_a_cache_that_can_not_be_written(tmp_path):
 
 @needs_c
 @pytest.mark.parametrize("static", [True, False])
-def test_compiled_programs(tmp_path, static):
+def test_is_static_detects_statically_linked_programs(tmp_path, static):
     source, program = tmp_path / "program.c", tmp_path / "program"
     source.write_text("int main(void) { return 0; }\n")
     options = ["-static"] if static else []
@@ -124,7 +124,7 @@ def test_rejects_programs_that_are_not_static(tmp_path):
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.binary(max_size=120))
-def test_any_bytes(tmp_path, rest):
+def test_is_static_accepts_arbitrary_elf_bytes(tmp_path, rest):
     program = tmp_path / "noise"
     program.write_bytes(b"\x7fELF\x02\x01" + rest)
     assert shim.is_static(program) in (True, False)

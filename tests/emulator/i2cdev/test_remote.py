@@ -37,7 +37,7 @@ def remote(served):
     remote.bus.close()
 
 
-def test_files(remote):
+def test_remote_bus_files_have_independent_addresses(remote):
     first, second = remote.bus.open(), remote.bus.open()
     assert remote.ask(first, linux.Call.IOCTL, linux.pack_ioctl(linux.Ioctl.SLAVE, 0x1A)) == (
         0,
@@ -47,7 +47,7 @@ def test_files(remote):
     assert remote.ask(second, linux.Call.READ, linux.pack_read(2)) == (-errno.ENXIO, b"")
 
 
-def test_large_both_ways(remote, registers):
+def test_remote_bus_transfers_the_largest_messages_in_both_directions(remote, registers):
     registers.i2c_write = lambda _byte: True
     file = remote.bus.open()
     messages = [linux.RdwrMessage(0x1A, 0, 8192, bytes(8192))] * 21 + [

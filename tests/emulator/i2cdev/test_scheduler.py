@@ -190,7 +190,7 @@ def test_transfers_one_after_the_other_take_the_time_of_the_wire(make):
 
 @settings(deadline=None, max_examples=20)
 @given(st.lists(st.integers(0, 1000), min_size=1, max_size=5))
-def test_answers_are_never_early(think_us):
+def test_transfers_never_finish_before_their_wire_time(think_us):
     """Whatever the programs do, the wire does one thing at a time."""
     with pytest.MonkeyPatch.context() as patch:
         bench = ScheduledWorld(patch)
@@ -203,7 +203,7 @@ def test_answers_are_never_early(think_us):
 
 
 @pytest.mark.parametrize("think_us", [TURNAROUND_NS // US, 500, 5_000, 50_000])
-def test_a_call_now_and_then_takes_the_time_of_the_wire(make, think_us):
+def test_infrequent_calls_take_the_transfer_time(make, think_us):
     bench = make()
     program = bench.quick_and_slow(think_ns=think_us * US, calls=20)
     bench.scheduler.run()
@@ -211,7 +211,7 @@ def test_a_call_now_and_then_takes_the_time_of_the_wire(make, think_us):
 
 
 @pytest.mark.parametrize("speed", [0.5, 1.0, 20.0])
-def test_answers_come_in_time_after_virtual_time_was_sent_elsewhere(make, speed):
+def test_calls_keep_their_pace_after_a_jump_of_virtual_time(make, speed):
     """Neither ahead nor at another speed does a program wait for what wall time never gets to."""
     bench = make()
 
@@ -259,7 +259,7 @@ def test_time_lost_beyond_the_limit_is_not_recovered(make, when_us, stall_us):
 
 
 @pytest.mark.parametrize("bytes_", [32, 8192])
-def test_a_long_transfer(make, bytes_):
+def test_long_transfers_take_their_wire_time(make, bytes_):
     bench = make()
     program = bench.program(8 * US, 5, lambda: [I2cMessage(0x1A, read=bytes_)])
     bench.scheduler.run()
@@ -275,7 +275,7 @@ def test_programs_take_turns_on_the_wire(make):
     assert spans == pytest.approx([3 * READ_NS] * 3, rel=0.05)
 
 
-def test_at_full_speed_virtual_time_is_the_wire_s(make):
+def test_fast_pace_counts_wire_time_only(make):
     bench = make(fast=True)
     program = bench.program(think_ns=0, calls=101)
     bench.scheduler.run()

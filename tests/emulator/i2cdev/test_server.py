@@ -32,7 +32,7 @@ def test_each_client_has_its_own_device_file(served):
     assert served.ask(first, linux.Call.READ, linux.pack_read(3)) == (3, b"ABC")
 
 
-def test_a_file_under_its_key(served):
+def test_calls_reach_an_open_file_by_its_key_until_it_is_closed(served):
     opener, caller = served.connect(), served.connect()
     assert served.ask(opener, linux.Call.OPEN, key=77) == (0, b"")
     assert served.ask(caller, linux.Call.IOCTL, SLAVE, key=77) == (0, b"")
@@ -43,7 +43,7 @@ def test_a_file_under_its_key(served):
     assert served.ask(caller, linux.Call.READ, linux.pack_read(1), key=77) == (-errno.EBADF, b"")
 
 
-def test_a_key_that_is_used_again(served):
+def test_reused_key_survives_the_end_of_its_former_client(served):
     """The kernel reuses an inode number before the server sees the old client's end."""
     old, new, caller = served.connect(), served.connect(), served.connect()
     served.ask(old, linux.Call.OPEN, key=77)
@@ -69,7 +69,7 @@ def test_clients_take_turns_by_whole_transfers(served, registers):
     assert all(t[0] == t[1] == t[2] and t[3] == -1 for t in transfers)
 
 
-def test_calls_that_come_together(served):
+def test_calls_sent_together_are_answered_in_order(served):
     """All but the first are read before their turn."""
     client = served.connect()
     served.ask(client, linux.Call.IOCTL, SLAVE)
@@ -78,7 +78,7 @@ def test_calls_that_come_together(served):
     assert [client.receive() for _ in range(3)] == [(1, b"\0"), (1, b"\1"), (1, b"\2")]
 
 
-def test_largest_transfer(served):
+def test_server_returns_the_largest_transfer(served):
     client = served.connect()
     client.send(linux.Call.RDWR, LARGEST)
     served.serve()
@@ -117,7 +117,7 @@ class Babbler:
         return len(data)
 
 
-def test_busy_client_yields_to_the_next(adapter):
+def test_endlessly_sending_client_yields_after_each_call(adapter):
     babbler = Babbler()
     client = _Client(babbler, adapter, {}, lambda _events: None)
     client.exchange(hung_up=False)
@@ -125,7 +125,7 @@ def test_busy_client_yields_to_the_next(adapter):
     assert babbler.looks == 2
 
 
-def test_a_flood_waits_in_the_operating_system(served, registers):
+def test_unread_requests_wait_in_the_socket_buffer(served, registers):
     client = served.connect()
     client.socket.setblocking(False)
     frame, sent = packed(linux.Call.IOCTL, SLAVE), 0
@@ -155,7 +155,7 @@ def test_partial_call_does_not_spin_the_server(served):
 
 
 @pytest.mark.parametrize("cut", [1, 4, 5, 12])
-def test_a_client_that_dies_in_a_message(served, cut):
+def test_client_that_dies_within_a_message_is_dropped(served, cut):
     client, other = served.connect(), served.connect()
     client.socket.sendall(packed(linux.Call.READ, linux.pack_read(1))[:cut])
     served.serve()
@@ -164,7 +164,7 @@ def test_a_client_that_dies_in_a_message(served, cut):
     assert served.server.clients == 1
 
 
-def test_a_client_that_dies_in_its_transfer(served, registers):
+def test_transfer_completes_after_its_client_died(served, registers):
     client, other = served.connect(), served.connect()
     client.send(linux.Call.RDWR, linux.pack_rdwr([linux.RdwrMessage(0x1A, 0, 3, b"\x20\xaa\xbb")]))
     served.server.exchange(0)
@@ -206,7 +206,7 @@ def test_arbitrary_bytes_do_not_harm_the_server(served, data):
     assert not served.adapter.busy
 
 
-def test_more_clients_than_room_wait(served):
+def test_clients_beyond_the_limit_wait_for_a_free_place(served):
     clients = [served.connect() for _ in range(MAX_CLIENTS + 1)]
     late = clients[-1]
     assert served.server.clients == MAX_CLIENTS
@@ -218,7 +218,7 @@ def test_more_clients_than_room_wait(served):
     assert late.receive() == (0, b"")
 
 
-def test_a_waiting_server_wakes_up(served):
+def test_request_wakes_a_waiting_server(served):
     client = served.connect()
     served.wait(0.0)
     client.send(linux.Call.IOCTL, SLAVE)
@@ -247,7 +247,7 @@ def test_socket_path_must_be_free_in_a_private_folder(served, tmp_path, serve_at
     assert file.read_text() == "precious"
 
 
-def test_the_socket_of_a_dead_emulation_is_replaced(served, serve_at):
+def test_stale_socket_of_a_dead_emulation_is_replaced(served, serve_at):
     path = Path(served.server.name).with_name("dead")
     dead = socket.socket(socket.AF_UNIX)
     dead.bind(str(path))
@@ -261,7 +261,7 @@ def test_closing_removes_the_socket(tmp_path, serve_at):
     assert not os.path.lexists(server.name)
 
 
-def test_a_program_without_supervisor_is_served_until_it_ends(
+def test_preload_program_is_served_until_it_exits(
     adapter: I2cAdapter, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(running, "shim_library", lambda: tmp_path / "none.so")

@@ -50,13 +50,13 @@ def perform(kernel: Any, bus: Any) -> Perform:
         (READ, SmbusSize.I2C_BLOCK_BROKEN, [[0x20], 32, -1]),
     ],
 )
-def test_wire(perform: Perform, registers, direction, size, wire):
+def test_smbus_calls_have_their_i2c_bytes(perform: Perform, registers, direction, size, wire):
     registers.memory[0x24] = 24  # where a block process call goes on to read: its length
     perform(direction, 0x20, size, BLOCK)
     assert registers.log == wire
 
 
-def test_answers(perform: Perform, registers):
+def test_smbus_reads_return_register_data(perform: Perform, registers):
     assert perform(READ, 0x41, SmbusSize.BYTE_DATA)[0] == 0x41
     assert perform(READ, 0x41, SmbusSize.WORD_DATA)[:2] == b"\x41\x42"
     assert perform(READ, 4, SmbusSize.BLOCK_DATA)[:5] == bytes([4, 5, 6, 7, 8])
@@ -66,7 +66,7 @@ def test_answers(perform: Perform, registers):
     assert perform(READ, 0, SmbusSize.BYTE)[0] == 9
 
 
-def test_block_of_nothing_is_a_probe(perform: Perform, registers):
+def test_i2c_block_of_zero_bytes_reads_nothing(perform: Perform, registers):
     assert perform(READ, 0x41, SmbusSize.I2C_BLOCK_DATA, bytes(34)) == bytes(34)
     assert registers.log == [[0x41], 0, -1]
 
@@ -75,18 +75,18 @@ def test_write_leaves_its_data_unchanged(perform: Perform):
     assert perform(WRITE, 0x41, SmbusSize.WORD_DATA, BLOCK) == BLOCK
 
 
-def test_known_checksum():
+def test_smbus_checksum_matches_the_crc_8_check_value():
     """CRC-8 of "123456789" with polynomial 7 and start 0, from the catalogue of CRC algorithms."""
     assert checksum(b"123456789") == 0xF4
 
 
 @given(st.binary(max_size=40))
-def test_data_with_their_checksum_leave_nothing(data):
+def test_checksum_over_data_and_checksum_is_zero(data):
     assert checksum([*data, checksum(data)]) == 0
 
 
 @pytest.mark.parametrize("size", [SmbusSize.BYTE, SmbusSize.BYTE_DATA, SmbusSize.BLOCK_DATA])
-def test_written_checksum_covers_all(perform: Perform, registers, size):
+def test_smbus_write_checksum_covers_address_and_data(perform: Perform, registers, size):
     perform(WRITE, 0x20, size, BLOCK, pec=True)
     *data, last = registers.log[0]
     assert checksum([ADDRESS << 1, *data, last]) == 0
@@ -107,7 +107,7 @@ def test_read_checksum_is_checked(perform: Perform, registers, size, flip):
 
 
 @pytest.mark.parametrize("size", [SmbusSize.QUICK, SmbusSize.I2C_BLOCK_DATA])
-def test_some_have_no_checksum(perform: Perform, registers, size):
+def test_smbus_quick_and_i2c_block_have_no_checksum(perform: Perform, registers, size):
     perform(WRITE, 0x20, size, BLOCK)
     plain = list(registers.log)
     perform(WRITE, 0x20, size, BLOCK, pec=True)

@@ -42,7 +42,7 @@ def write(folder: Path, name: str, content: bytes | str) -> Path:
     return path
 
 
-def test_elf_hex_and_binary_file_give_the_same_image(tmp_path):
+def test_elf_hex_and_binary_file_load_the_same_image(tmp_path):
     records = hex_record(4, 0, b"\0\0") + hex_record(0, 0, VECTORS[:6])
     records += hex_record(0, 6, VECTORS[6:]) + hex_record(3, 0, bytes(4)) + hex_record(1, 0, b"")
     paths = [

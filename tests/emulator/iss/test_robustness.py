@@ -181,7 +181,7 @@ def run_until(bench: Bench, until_ps: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_time_passes_after_random_writes_to_any_register(seed: int) -> None:
+def test_machine_runs_on_after_random_register_writes(seed: int) -> None:
     rng = random.Random(seed)
     bench = Bench() if seed % 2 else Bench(0xB672, WFI, 0xE7FD)
     bench.load("CMU", HFPERCLKEN0=0xFFFF_FFFF, HFCORECLKEN0=0xFFFF_FFFF, OSCENCMD=0x155)
@@ -200,7 +200,7 @@ def test_time_passes_after_random_writes_to_any_register(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_time_passes_after_random_writes_and_inputs_of_interfaces(seed: int) -> None:
+def test_machine_runs_on_after_random_interface_writes_and_inputs(seed: int) -> None:
     rng = random.Random(seed)
     bench = asleep(1) if seed % 2 else Bench()
     machine = bench.machine

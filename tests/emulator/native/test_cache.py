@@ -26,14 +26,12 @@ def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]
     cache._private_folder.cache_clear()
 
 
-def test_one_that_can_be_written_to_is_used(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_writable_cache_folder_is_used(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "not" / "yet"))
     assert cache.cache_folder() == tmp_path / "not" / "yet" / "cubestack"
 
 
-def test_else_a_private_one_takes_its_place(
+def test_unwritable_cache_is_replaced_by_a_private_folder(
     temporary: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     folder = cache.cache_folder()
@@ -44,7 +42,7 @@ def test_else_a_private_one_takes_its_place(
 
 
 @pytest.mark.parametrize("mode", [0o755, 0o720])
-def test_one_that_others_may_write_to_is_not_trusted(temporary: Path, mode: int) -> None:
+def test_cache_folder_with_open_permissions_is_not_trusted(temporary: Path, mode: int) -> None:
     others = temporary / f"cubestack-{os.getuid()}"
     others.mkdir()
     others.chmod(mode)
@@ -53,7 +51,7 @@ def test_one_that_others_may_write_to_is_not_trusted(temporary: Path, mode: int)
     assert folder.stat().st_mode & 0o777 == 0o700
 
 
-def test_a_link_that_somebody_laid_is_not_followed(temporary: Path) -> None:
+def test_cache_folder_ignores_an_existing_symlink(temporary: Path) -> None:
     (temporary / "elsewhere").mkdir(mode=0o700)
     link = temporary / f"cubestack-{os.getuid()}"
     link.symlink_to(temporary / "elsewhere")
@@ -61,7 +59,7 @@ def test_a_link_that_somebody_laid_is_not_followed(temporary: Path) -> None:
 
 
 @pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
-def test_what_nobody_uses_makes_room(tmp_path: Path) -> None:
+def test_unused_cached_libraries_are_removed(tmp_path: Path) -> None:
     def build(_compiler: Compiler, scratch: Path, _log: Path) -> Path:
         built = scratch / "a.so"
         built.write_bytes(b"library")
@@ -80,7 +78,7 @@ def test_what_nobody_uses_makes_room(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
-def test_who_comes_second_waits_for_what_is_being_built(
+def test_second_builder_waits_for_the_first(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     builds, looked = list[Path](), threading.Event()
@@ -111,7 +109,7 @@ def test_who_comes_second_waits_for_what_is_being_built(
     assert len(builds) == 1
 
 
-def test_cxx_comes_first_and_version_tells_compilers_apart(tmp_path, monkeypatch):
+def test_cxx_variable_is_preferred_and_versions_distinguish_compilers(tmp_path, monkeypatch):
     monkeypatch.setenv("CXX", str(make_compiler(tmp_path, "mycc", "exit 1", "one")))
     first = compiler.find_compiler()
     assert first is not None
@@ -120,7 +118,7 @@ def test_cxx_comes_first_and_version_tells_compilers_apart(tmp_path, monkeypatch
     assert compiler.find_compiler() != first
 
 
-def test_broken_compiler_is_passed_over(without_compiler, tmp_path):
+def test_broken_compiler_is_skipped(without_compiler, tmp_path):
     (tmp_path / "c++").write_text("#!/bin/sh\nexit 1\n")
     (tmp_path / "c++").chmod(0o755)
     assert compiler.find_compiler() is None
@@ -140,7 +138,7 @@ def test_ziglang_wheel_is_the_last_resort(without_compiler, monkeypatch):
     )
 
 
-def test_cache_is_where_the_user_wants_it(tmp_path, monkeypatch):
+def test_cache_folder_follows_xdg_cache_home(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     assert cache.cache_folder() == tmp_path / "cubestack"
     monkeypatch.setenv("XDG_CACHE_HOME", "")
@@ -168,7 +166,7 @@ def shipped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / name
 
 
-def test_is_loaded_without_a_compiler_and_whatever_the_tools(shipped: Path) -> None:
+def test_shipped_library_loads_without_a_compiler_or_matching_tools(shipped: Path) -> None:
     newer = cache.recipe("a design", "design", [], refuse_to_build, [b"another version of a tool"])
     assert cache.library_of(RECIPE) == cache.library_of(newer) == shipped
 
@@ -193,7 +191,7 @@ def test_cxx_chooses_a_compiler_over_the_shipped_library(monkeypatch: pytest.Mon
         cache.library_of(RECIPE)
 
 
-def test_collected_recipes_are_not_built(shipped: Path) -> None:
+def test_recipes_are_only_listed_while_being_collected(shipped: Path) -> None:
     with cache.collected() as recipes, pytest.raises(NoCompilerError, match="only listed"):
         cache.library_of(RECIPE)
     assert recipes == [RECIPE]

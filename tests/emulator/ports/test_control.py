@@ -62,7 +62,7 @@ def running(request: pytest.FixtureRequest) -> Iterator[Running]:
     running.end()
 
 
-def test_an_act_is_done_in_the_emulation_s_thread(running: Running) -> None:
+def test_control_calls_run_in_the_emulation_thread(running: Running) -> None:
     assert running.ask(threading.get_ident) == running.thread.ident
 
 
@@ -81,7 +81,7 @@ def test_time_stops_while_held(running: Running) -> None:
     assert not running.ask(lambda: port.held)
 
 
-def test_one_event_after_the_other(running: Running) -> None:
+def test_step_advances_by_single_events(running: Running) -> None:
     running.ask(running.port.pause)
     before = len(running.ticks)
     assert running.ask(running.port.step) == 1
@@ -118,7 +118,7 @@ def test_serves_other_ports_every_20_ms_during_a_run(monkeypatch: pytest.MonkeyP
     port.close()
 
 
-def test_new_request_ends_a_run(running: Running) -> None:
+def test_pause_request_ends_a_run(running: Running) -> None:
     arrived: Future[int] = running.ask(lambda: running.port.run_to(10**9 * PS_PER_S))
     running.ask(running.port.pause)
     with pytest.raises(RuntimeError, match="the run was held before its end"):
@@ -126,7 +126,7 @@ def test_new_request_ends_a_run(running: Running) -> None:
 
 
 @pytest.mark.parametrize("running", ["real"], indirect=True)
-def test_no_catching_up_after_a_jump(running: Running) -> None:
+def test_real_pace_does_not_catch_up_after_a_jump(running: Running) -> None:
     arrived: Future[int] = running.ask(lambda: running.port.run_to(100 * PS_PER_S))
     arrived.result(SOON_S)
     running.ask(running.port.resume)
@@ -135,7 +135,7 @@ def test_no_catching_up_after_a_jump(running: Running) -> None:
 
 
 @pytest.mark.parametrize("speed", [0.5, 20.0])
-def test_speed_is_kept_on_a_simulated_wall_clock(speed: float) -> None:
+def test_pace_speed_is_kept_on_a_simulated_wall_clock(speed: float) -> None:
     wall, kernel = Wall(), Kernel()
 
     def wait(watched: Any, timeout_s: float) -> None:
@@ -163,7 +163,7 @@ def test_speeds_have_limits(running: Running) -> None:
             running.ask(partial(running.port.step, events))
 
 
-def test_reports_other_holders(running: Running) -> None:
+def test_control_step_reports_another_holder_of_time(running: Running) -> None:
     running.ask(lambda: running.kernel.hold("debugger"))
     with pytest.raises(ValueError, match="held by the debugger"):
         running.ask(running.port.step)
@@ -186,7 +186,7 @@ class Desk:
         self.pace = Pace(self.kernel, mode, lambda: self.ns)  # type: ignore[arg-type]
 
 
-def test_the_scale_begins_where_virtual_time_is() -> None:
+def test_pace_starts_at_the_current_virtual_time() -> None:
     desk = Desk()
     assert (desk.pace.now_ps(), desk.pace.now_ns()) == (0, desk.ns)
     desk.ns += 5
@@ -199,7 +199,7 @@ def test_the_scale_begins_where_virtual_time_is() -> None:
 
 
 @pytest.mark.parametrize("speed", [1.0, 2.0, 0.25, 3.7])
-def test_a_speed_holds_from_its_change_on(speed: float) -> None:
+def test_speed_change_applies_from_its_time_on(speed: float) -> None:
     desk = Desk()
     desk.ns += 1000
     desk.kernel.run(until=desk.pace.now_ps())
@@ -210,7 +210,7 @@ def test_a_speed_holds_from_its_change_on(speed: float) -> None:
 
 
 @pytest.mark.parametrize("speed", [1.0, 2.0, 0.5, 3.7])
-def test_conversions_agree_and_never_round_early(speed: float) -> None:
+def test_pace_conversions_are_inverse_and_never_early(speed: float) -> None:
     desk = Desk()
     desk.kernel.run(until=12_345)
     desk.pace.change("real", speed)
@@ -223,7 +223,7 @@ def test_conversions_agree_and_never_round_early(speed: float) -> None:
         assert [desk.pace.ns_at(12_345 + ps) - at for ps in (0, 1, 1000, 1001)] == [0, 1, 1, 2]
 
 
-def test_the_mode_says_who_waits() -> None:
+def test_pace_mode_is_fast_or_real() -> None:
     desk = Desk("fast")
     assert desk.pace.fast
     desk.pace.change("real")

@@ -64,7 +64,7 @@ def test_input_of_a_client_that_closes_at_once_arrives(port, device):
 
 
 @pytest.mark.parametrize("leave", ["close", "reset"])
-def test_client_that_dies_in_mid_frame(port, device, connect, leave):
+def test_bytes_of_a_client_that_dies_within_a_frame_are_kept(port, device, connect, leave):
     first = connect()
     first.write(b"half a fra")
     assert device.hears(port, 10) == b"half a fra"
@@ -77,7 +77,7 @@ def test_client_that_dies_in_mid_frame(port, device, connect, leave):
     assert_fresh(port, device, second)
 
 
-def test_client_can_not_flood_the_line(port, device, connect):
+def test_fast_client_is_limited_to_the_line_rate(port, device, connect):
     client = connect()
     sent = bytes(i * 37 % 251 for i in range(100_000))
     position, backlogs = 0, set()
@@ -93,7 +93,9 @@ def test_client_can_not_flood_the_line(port, device, connect):
     assert max(backlogs) == MAX_UNSENT
 
 
-def test_client_that_floods_wakes_nobody_and_makes_room_when_it_dies(kind, port, device, connect):
+def test_flooding_client_causes_no_wakeups_and_frees_the_port_when_it_dies(
+    kind, port, device, connect
+):
     first, sent = connect(), 0
     while count := first.write(bytes(1 << 20)):
         sent += count
@@ -110,7 +112,7 @@ def test_client_that_floods_wakes_nobody_and_makes_room_when_it_dies(kind, port,
     assert_fresh(port, device, connect())
 
 
-def test_port_without_anything_to_do_wakes_nobody(port, device, connect):
+def test_idle_port_causes_no_wakeups(port, device, connect):
     port.exchange(device.kernel.now)
     assert ready(port) == []
     client = connect()
@@ -123,7 +125,7 @@ def test_port_without_anything_to_do_wakes_nobody(port, device, connect):
     assert ready(port) == []
 
 
-def test_client_that_never_reads_wakes_nobody(port, device, connect):
+def test_client_that_never_reads_causes_no_wakeups(port, device, connect):
     connect()
     device.wait_for(lambda: port.congested, doing=lambda: device.sends(port, bytes(1 << 17)))
     device.wait_for(lambda: not ready(port), doing=lambda: port.exchange(device.kernel.now))
@@ -139,7 +141,7 @@ def test_pty_link_leads_to_a_terminal(port, path):
 
 
 @a_pty
-def test_pty_input_survives_the_tidying_after_its_client(port, device, connect):
+def test_pty_delivers_input_of_a_client_that_closed(port, device, connect):
     terminal = connect()
     sent = bytes(i % 251 for i in range(MAX_UNSENT + 3000))
     assert terminal.write(sent) == len(sent)
@@ -149,7 +151,7 @@ def test_pty_input_survives_the_tidying_after_its_client(port, device, connect):
 
 
 @a_pty
-def test_pty_stays_open_while_one_of_two_clients_has_it(port, device, connect):
+def test_pty_stays_open_while_one_of_two_clients_remains(port, device, connect):
     first, second = connect(), connect()
     device.sends(port, b"kept")
     first.close()
@@ -167,7 +169,7 @@ def cooked(fd: int) -> None:
 
 
 @a_pty
-def test_pty_leaves_a_client_its_settings_and_is_raw_again_after_it(port, device, connect):
+def test_pty_keeps_a_clients_settings_and_is_raw_after_it_left(port, device, connect):
     terminal = connect()
     original = termios.tcgetattr(terminal.fd)
     cooked(terminal.fd)
@@ -227,7 +229,7 @@ def test_pty_that_can_not_be_unlocked_is_replaced(port, device, path, connect, m
 
 
 @pytest.mark.parametrize("kind", ["file", "directory", "link"])
-def test_pty_takes_no_path_that_exists_and_leaves_the_line_alone(device, path, kind):
+def test_pty_rejects_an_existing_path_and_leaves_the_line_unchanged(device, path, kind):
     if kind == "file":
         path.touch()
     elif kind == "directory":
@@ -242,12 +244,12 @@ def test_pty_takes_no_path_that_exists_and_leaves_the_line_alone(device, path, k
     assert heard == [b"x"]
 
 
-def test_pty_path_in_no_directory(device, tmp_path):
+def test_pty_path_without_a_folder_raises_port_error(device, tmp_path):
     with pytest.raises(PortError, match="nowhere/ttyTEST: No such file or directory"):
         PtyEndpoint(tmp_path / "nowhere" / "ttyTEST", device.uart)
 
 
-def test_pty_replaces_the_link_of_a_run_that_died_and_removes_its_own_only(device, path):
+def test_pty_replaces_a_stale_link_and_removes_only_its_own(device, path):
     path.symlink_to("/dev/pts/987654")
     endpoint = PtyEndpoint(path, device.uart)
     assert os.path.realpath(path) != "/dev/pts/987654"
@@ -270,18 +272,18 @@ def test_pty_replaces_the_link_of_a_run_that_died_and_removes_its_own_only(devic
         *((host, 0, "is not an address of") for host in ("", "no.such.invalid", "a" * 70)),
     ],
 )
-def test_tcp_address_that_can_not_be(device, host, port, text):
+def test_invalid_tcp_address_is_rejected(device, host, port, text):
     with pytest.raises(PortError, match=text):
         TcpEndpoint(host, port, device.uart)
 
 
-def test_tcp_for_other_machines_when_allowed(device):
+def test_tcp_accepts_other_machines_when_allowed(device):
     endpoint = TcpEndpoint("0.0.0.0", 0, device.uart, allow_remote=True)
     assert endpoint.address[0] == "0.0.0.0"
     endpoint.close()
 
 
-def test_tcp_port_is_taken_until_it_is_closed_which_drops_the_client(device):
+def test_tcp_port_is_in_use_until_closed_and_closing_drops_the_client(device):
     first = TcpEndpoint(LOOPBACK, 0, device.uart)
     number = first.address[1]
     assert first.name == f"tcp://127.0.0.1:{number}"
@@ -314,7 +316,7 @@ def test_tcp_client_that_reconnects_at_once_is_served(port, device, connect, lea
 
 
 @a_tcp
-def test_tcp_client_that_has_sent_all_still_gets_the_answer(port, device, connect):
+def test_tcp_client_receives_the_answer_after_closing_its_send_side(port, device, connect):
     device.answers = 1
     client = connect()
     client.write(b"question")
@@ -324,7 +326,7 @@ def test_tcp_client_that_has_sent_all_still_gets_the_answer(port, device, connec
     assert client.read(8) == b"question"
 
 
-def test_writing_is_waited_for_while_something_is_unsent() -> None:
+def test_gdb_port_polls_for_output_only_while_data_is_unsent() -> None:
     target: Any = FakeTarget()
     endpoint = GdbEndpoint(0, target)
     (server,) = endpoint.watched()

@@ -49,7 +49,7 @@ def test_receives_in_any_chunk_size(blocks, takes):
     assert taken + line.take(10**12) == sent
 
 
-def test_unplugged_line_hears_nothing():
+def test_unplugged_line_receives_nothing():
     kernel, uart, line = make()
     uart.send(b"before")
     line.unplug()
@@ -58,7 +58,7 @@ def test_unplugged_line_hears_nothing():
     kernel.run()
 
 
-def test_newer_line_takes_over():
+def test_newer_host_line_replaces_the_older():
     _, uart, older = make()
     newer = HostLine(uart)
     uart.send(b"x")
@@ -73,7 +73,7 @@ def serial(device) -> DirectSerial:
     return DirectSerial(device.kernel, device.uart)
 
 
-def test_answer_comes_when_the_wire_delivers_it(device, serial):
+def test_answer_is_read_when_its_wire_time_has_passed(device, serial):
     device.answers = 1
     serial.write(b"ab")
     assert serial.read(10, 1.0) == b"a"
@@ -97,14 +97,14 @@ def test_read_times_out_without_data(device, serial):
 
 
 @pytest.mark.parametrize(("timeout_s", "answer"), [(9e-6, b""), (10e-6, b"x")])
-def test_byte_at_the_timeout(device, serial, timeout_s, answer):
+def test_byte_at_the_timeout_is_returned(device, serial, timeout_s, answer):
     device.uart.send(b"x")
     assert serial.read(10, timeout_s) == answer
     assert device.kernel.now == round(timeout_s * PS_PER_S)
 
 
 @pytest.mark.parametrize("timeout_s", [0.0, -1.0])
-def test_no_timeout_does_not_wait(device, serial, timeout_s):
+def test_read_without_a_time_out_returns_immediately(device, serial, timeout_s):
     device.uart.send(b"x")
     assert serial.read(10, timeout_s) == b""
     assert device.kernel.now == 0
@@ -123,7 +123,7 @@ def test_other_events_do_not_end_a_read(device, serial):
     assert device.kernel.now == 100 * BYTE
 
 
-def test_closed_link_hears_nothing(device, serial):
+def test_closed_link_receives_nothing(device, serial):
     serial.close()
     device.uart.send(b"x")
     assert serial.read(10, 1.0) == b""
@@ -142,7 +142,7 @@ def i2c(memory) -> DirectI2c:
     return DirectI2c(kernel, bus)
 
 
-def test_smbus2_messages_of_every_byte_value(i2c, memory):
+def test_direct_i2c_accepts_smbus2_messages(i2c, memory):
     write, read = i2c_msg.write(0x1A, [2, 0xAA]), i2c_msg.read(0x1A, 256)
     i2c.i2c_rdwr(write, read)
     assert memory.calls == ["write", 2, 0xAA, "read", "stop"]
@@ -175,7 +175,7 @@ def test_waiting_passes_virtual_time():
     assert kernel.now == PS_PER_S // 4
 
 
-def test_calls_of_a_device_file(i2c, memory):
+def test_direct_i2c_port_accepts_device_file_calls(i2c, memory):
     assert i2c.call(Call.IOCTL, pack_ioctl(Ioctl.SLAVE, 0x1A)) == (0, b"")
     assert i2c.call(Call.WRITE, b"\x02") == (1, b"")
     assert i2c.call(Call.READ, pack_read(3)) == (3, b"\x00\x01\x02")

@@ -114,7 +114,7 @@ def test_virtual_time_continues_from_its_current_value(bench):
     assert bench.kernel.now == pytest.approx(78 * PS_PER_S, abs=0.05 * PS_PER_S)
 
 
-def test_what_a_client_writes_comes_at_the_time_of_its_writing(bench):
+def test_client_bytes_arrive_at_the_time_of_writing(bench):
     """Not at the time when the scheduler went to sleep."""
     bench.wall.during_wait[3] = 11 * NS_PER_MS
     bench.run("real", 200)
@@ -134,7 +134,7 @@ def test_reports_lag(bench):
     assert len(bench.port.exchanges) >= 10 / (2 * SLICE_S)  # ports are served meanwhile
 
 
-def test_lag_that_was_recovered_is_not_reported(bench):
+def test_recovered_lag_is_not_reported(bench):
     bench.tick(PS_PER_MS, cost_ns=3 * NS_PER_MS, until_ps=2 * PS_PER_S)
     bench.run("real", 20_000)
     assert [text for time, text in bench.reports if time > 6500] == []
@@ -161,7 +161,7 @@ def test_work_runs_ahead_of_wall_time(bench):
     assert min(bench.wall.waits) > 0.9 * IDLE_S
 
 
-def test_bytes_on_the_wire_are_brought_to_their_end(bench):
+def test_fast_pace_runs_until_bytes_on_the_wire_have_arrived(bench):
     """Nothing is scheduled then, so there is no event to go to."""
     uart = Uart(bench.kernel, 10_000, lambda _byte: None, lambda: None, silence_bytes=100)
     bench.busy = lambda: uart.busy
@@ -172,7 +172,7 @@ def test_bytes_on_the_wire_are_brought_to_their_end(bench):
     assert 5 * PS_PER_S <= bench.kernel.now < 5.6 * PS_PER_S
 
 
-def test_bytes_on_the_wire_do_not_trigger_a_jump_to_a_far_event(bench):
+def test_bytes_on_the_wire_do_not_cause_a_jump_to_a_far_event(bench):
     bench.kernel.timeout(3600 * PS_PER_S)
     bench.port.releases = [i * PS_PER_MS for i in range(1, 101)]
     bench.busy = lambda: bool(bench.port.releases)
@@ -180,7 +180,7 @@ def test_bytes_on_the_wire_do_not_trigger_a_jump_to_a_far_event(bench):
     assert bench.kernel.now < PS_PER_S
 
 
-def test_bytes_that_have_arrived_are_handed_over_before_time_goes_on(bench):
+def test_arrived_bytes_are_delivered_before_time_advances(bench):
     bench.tick(PS_PER_MS)
     bench.busy = lambda: True
     bench.port.releases = [5 * PS_PER_MS + 1]
@@ -203,13 +203,13 @@ def test_scheduler_sleeps_while_a_busy_device_has_no_events(bench):
     assert min(bench.wall.waits) == IDLE_S
 
 
-def test_stop_before_the_start():
+def test_scheduler_stopped_before_start_returns_at_once():
     scheduler = RealtimeScheduler(Kernel(), [], lambda: False, Pace(Kernel(), "real"))
     scheduler.stop()
     scheduler.run()
 
 
-def test_stop_from_a_signal_handler(bench):
+def test_scheduler_can_be_stopped_from_a_signal_handler(bench):
     scheduler = RealtimeScheduler(
         bench.kernel,
         [],
@@ -225,7 +225,7 @@ def test_stop_from_a_signal_handler(bench):
 
 
 @pytest.mark.parametrize("pace", ["real", "fast"])
-def test_stop_from_another_thread_while_the_device_is_busy(bench, pace):
+def test_scheduler_can_be_stopped_from_another_thread_while_busy(bench, pace):
     bench.tick(PS_PER_MS)
     scheduler = RealtimeScheduler(bench.kernel, [], lambda: True, Pace(bench.kernel, pace))
     thread = threading.Thread(target=scheduler.run)
@@ -249,7 +249,7 @@ def test_error_of_the_device_ends_the_run(bench):
     ("sent", "events", "timeout_s"),
     [(b"x", select.POLLIN, 3600), (b"", select.POLLOUT, 3600), (b"", select.POLLIN, 0.0001)],
 )
-def test_waiting_ends_with_input_with_room_for_output_or_in_time(sent, events, timeout_s):
+def test_wait_ends_on_input_output_space_or_time_out(sent, events, timeout_s):
     ours, theirs = socket.socketpair()
     with ours, theirs:
         theirs.send(sent)
@@ -258,7 +258,7 @@ def test_waiting_ends_with_input_with_room_for_output_or_in_time(sent, events, t
 
 
 @pytest.mark.parametrize("pace", ["real", "fast"])
-def test_virtual_time_stands_while_the_kernel_is_paused(bench, pace):
+def test_virtual_time_stops_while_the_kernel_is_paused(bench, pace):
     ticks = bench.tick(10 * PS_PER_MS)
     kernel, wall, since = bench.kernel, bench.wall, []
 

@@ -49,13 +49,13 @@ def serve(port, device, client, data: bytes, byte_times: int = 100) -> None:
         port.exchange(device.advance(byte_times // 10))
 
 
-def test_only_this_machine_unless_allowed(device):
+def test_rfc2217_listens_on_other_interfaces_only_if_allowed(device):
     with pytest.raises(PortError, match=r"0\.0\.0\.0 is open to other machines"):
         Rfc2217Endpoint("0.0.0.0", 0, device.uart)
     Rfc2217Endpoint("0.0.0.0", 0, device.uart, allow_remote=True).close()
 
 
-def test_telnet_escapes_both_ways(port, device, connect):
+def test_telnet_escapes_work_in_both_directions(port, device, connect):
     client = connect()
     serve(port, device, client, telnet.IAC + telnet.IAC + b"a", 100)
     assert device.received == b"\xffa"
@@ -63,7 +63,7 @@ def test_telnet_escapes_both_ways(port, device, connect):
     assert received_until(client, b"\xff\xffz")
 
 
-def test_what_the_device_says_goes_out_in_the_same_turn(port, device, connect):
+def test_rfc2217_sends_device_bytes_in_the_same_exchange(port, device, connect):
     client = connect()
     device.uart.send(b"hello")
     port.exchange(device.advance(100))
@@ -101,7 +101,7 @@ def test_client_that_breaks_the_protocol_is_dropped(port, device, connect, junk)
 
 
 @pytest.mark.parametrize("baud", [13_000_000, 0])
-def test_impossible_rate_leaves_the_old_one(port, device, connect, baud):
+def test_rfc2217_impossible_rate_keeps_the_old_one(port, device, connect, baud):
     client = connect()
     serve(port, device, client, baud_option(baud))
     assert device.uart.host_form == device.uart.form
@@ -123,7 +123,7 @@ def test_break_reaches_the_device(port, device, connect):
     assert device.uart.framing_errors == 1
 
 
-def test_purge_takes_back_what_is_not_on_the_wire(port, device, connect):
+def test_rfc2217_purge_discards_bytes_not_yet_on_the_wire(port, device, connect):
     client = connect()
     client.write(bytes(50))
     wait_ready(port.watched(), TIMEOUT_S)
@@ -135,7 +135,7 @@ def test_purge_takes_back_what_is_not_on_the_wire(port, device, connect):
     assert 0 < len(device.received) < 50
 
 
-def test_flood_of_requests_that_nobody_reads_the_answers_of(port, device, connect):
+def test_rfc2217_request_flood_without_reads_keeps_replies_bounded(port, device, connect):
     client = connect()
     client.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
     request, sent, idle = option(telnet.NOTIFY_MODEMSTATE, b""), 0, 0
@@ -179,7 +179,7 @@ def test_wrong_rate_garbles_reproducibly(port, device):
     assert heard[0][0] == 0b01100110  # 0 for the start's second half, then 1100110 of "U"
 
 
-def test_wrong_parity_is_not_understood(port, device):
+def test_bytes_with_wrong_parity_are_not_received(port, device):
     with served(device, port, "fast"), open_url(port, parity="E") as client:
         client.write(b"\3\3\3\1")
         client.parity = "N"

@@ -66,7 +66,7 @@ def test_bytes_are_released_when_they_have_arrived(port, device):
         device.advance(1)
 
 
-def test_a_client_is_waited_for_while_there_is_room_for_what_it_writes(port, device):
+def test_serial_port_stops_reading_when_its_buffer_is_full(port, device):
     connect(port, device, Client())
     assert port._events(reading=True) == select.POLLIN
     assert port._events(reading=False) == 0
@@ -74,7 +74,7 @@ def test_a_client_is_waited_for_while_there_is_room_for_what_it_writes(port, dev
     assert port._events(reading=True) == 0
 
 
-def test_releases_are_announced(port, device):
+def test_serial_port_announces_byte_release_times(port, device):
     byte_ps = device.uart.byte_ps
     connect(port, device, Client())
     device.uart.send(b"abc")
@@ -121,7 +121,7 @@ def test_client_receives_bytes_still_on_the_wire(port, device, arrived):
     assert client.read == b"answer!"[arrived:]
 
 
-def test_closed_port_hears_nothing(port, device):
+def test_closed_port_sends_nothing_to_its_client(port, device):
     client = connect(port, device, Client())
     port.close()
     device.uart.send(b"x")
@@ -188,7 +188,7 @@ def test_reports_wrong_format_once_per_client(desk, form):
     assert desk.told[0].startswith(f"{desk.port.name}: ")
 
 
-def test_the_devices_own_format_and_none_at_all_are_good(desk):
+def test_line_accepts_the_devices_own_and_unset_terminal_formats(desk):
     with desk.client() as client:
         client.write(b"mine")
         assert desk.serve() == b"mine"
@@ -211,7 +211,7 @@ def test_settings_hidden_by_the_kernel_are_not_reported(desk, settings):
 
 @strict
 @pytest.mark.parametrize("form", WRONG)
-def test_a_strict_line_has_the_clients_format(desk, form):
+def test_strict_pty_garbles_bytes_like_a_line_of_the_same_format(desk, form):
     """Beside a line without any terminal."""
     baud, rest = form.split()
     other = Device(Kernel(), BAUD)
@@ -233,7 +233,7 @@ def test_a_strict_line_has_the_clients_format(desk, form):
 
 
 @strict
-def test_the_next_client_is_understood(desk):
+def test_pty_understands_the_next_client_after_a_wrong_rate(desk):
     with desk.client(baudrate=9600) as client:
         client.write(b"garbled")
         assert desk.serve() != b"garbled"
@@ -247,7 +247,7 @@ def test_the_next_client_is_understood(desk):
         assert desk.serve() == b"fresh"
 
 
-def test_a_rate_without_a_constant(tmp_path):
+def test_non_standard_baud_rate_is_checked_like_a_standard_one(tmp_path):
     desk = Desk(tmp_path / "tty", True, baud=123_456)
     with closing(desk.port):
         for rate, heard in ((123_456, True), (BAUD, False), (None, True)):
@@ -258,7 +258,7 @@ def test_a_rate_without_a_constant(tmp_path):
         assert len(desk.told) == 1
 
 
-def test_a_refused_client_is_sent_no_frame_of_any_protocol():
+def test_refused_client_receives_no_frame_of_any_protocol():
     decoder = FrameDecoder(64)
     assert FrameEvent.FRAME not in [decoder.feed(byte) for byte in 3 * REFUSAL]
     assert not {0x1F, 0x7F, 0xFF} & {*REFUSAL}  # escape and start of a frame, escape of telnet

@@ -48,7 +48,7 @@ a_pty = pytest.mark.parametrize("kind", ["pty"])
         ("rfc2217", {"baudrate": 1_000_000}),
     ],
 )
-def test_pyserial(port, device, pace, options):
+def test_pyserial_exchanges_all_bytes_on_each_port_kind(port, device, pace, options):
     device.answers = 1
     url = port.name.replace("tcp:", "socket:")
     with served(device, port, pace):
@@ -61,7 +61,7 @@ def test_pyserial(port, device, pace, options):
 
 @a_pty
 @pytest.mark.parametrize("pace", ["real", "fast"])
-def test_plain_file_on_a_pty(port, device, pace):
+def test_pty_echoes_all_bytes_to_a_plain_file_object(port, device, pace):
     device.answers = 1
     with served(device, port, pace), contextlib.closing(open_client(port)) as terminal:
         terminal.write(ALL_BYTES)
@@ -89,7 +89,7 @@ def run(*command: str, stdin: bytes = b"") -> bytes:
 
 
 @needs("socat")
-def test_socat(kind, port, device, path):
+def test_socat_gets_its_echo(kind, port, device, path):
     device.answers = 1
     address = f"{path},raw,echo=0" if kind == "pty" else "TCP:{}:{}".format(*port.address)
     with served(device, port, "fast"):
@@ -98,7 +98,7 @@ def test_socat(kind, port, device, path):
 
 @needs("picocom")
 @a_pty
-def test_picocom(port, device, path):
+def test_picocom_gets_its_echo(port, device, path):
     device.answers = 1
     command = ["picocom", "-q", "-b", "115200", "--nolock", "--exit-after", "300", str(path)]
     with served(device, port, "fast"):
@@ -117,7 +117,7 @@ def c_client(tmp_path) -> Path:
 
 
 @a_pty
-def test_c_program_with_termios(port, device, path, c_client):
+def test_c_termios_program_gets_its_echo(port, device, path, c_client):
     device.answers = 1
     with served(device, port, "fast"):
         for _ in range(3):
@@ -125,7 +125,7 @@ def test_c_program_with_termios(port, device, path, c_client):
 
 
 @a_pty
-def test_plain_shell(port, device, path):
+def test_plain_shell_script_gets_its_echo(port, device, path):
     device.answers = 1
     with served(device, port, "fast"):
         script = f"exec 3<>{path}; printf 'hello' >&3; head -c 5 <&3"
@@ -190,7 +190,7 @@ class Desk:
         return self.adapter.busy or any(line.uart.busy for line in self.lines.values())
 
 
-def test_polite_clients_are_served_beside_bad_ones(tmp_path):
+def test_well_behaved_clients_are_served_beside_bad_ones(tmp_path):
     """On each kind of port one floods, one never reads, one stops in mid-frame.
 
     The fourth exchanges a byte a wait.
@@ -231,7 +231,7 @@ def test_polite_clients_are_served_beside_bad_ones(tmp_path):
         assert (grown, peak) < (SPARE_BYTES, SPARE_BYTES)
 
 
-def test_two_lines_of_a_device_at_once(tmp_path):
+def test_two_serial_lines_of_a_device_work_at_once(tmp_path):
     """As a CubeSense has them, with rates of their own."""
     kernel = Kernel()
     lines = [Device(kernel, 115_200, answers) for answers in (1, 3)]

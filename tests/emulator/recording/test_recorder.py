@@ -81,7 +81,7 @@ def test_replay_on_the_same_device_has_no_differences(tmp_path_factory, writes):
     assert Device().replay(recording) == []
 
 
-def test_times_are_those_of_the_wire(tmp_path):
+def test_recorded_times_are_those_on_the_wire(tmp_path):
     byte_ps = LineFormat(57_600).character_ps
     recording = record(tmp_path / "a.rec", [(5, b"ab"), (0, b"c")])
     assert recording.sent("uart", "host")[1] == [5 + i * byte_ps for i in range(3)]
@@ -101,7 +101,7 @@ def test_bytes_without_a_gap_are_one_event(tmp_path):
     assert [event.data for event in load_recording(path).line("uart")] == [b"abc", b"de"]
 
 
-def test_other_answers_are_named(tmp_path):
+def test_replay_reports_different_answers(tmp_path):
     recording = record(tmp_path / "a.rec", [(0, b"\x1f\x7f\x80\x1f\xff")])
     differences = Device(answer=2).replay(recording)
     assert len(differences) == 1
@@ -109,7 +109,7 @@ def test_other_answers_are_named(tmp_path):
     assert differences[0].endswith("0x21, recorded 0x20")
 
 
-def test_lost_transfers_are_named(tmp_path):
+def test_replay_reports_lost_i2c_transfers(tmp_path):
     recording = record(tmp_path / "a.rec", [])
     device = Device()
     device.bus._targets.clear()
@@ -119,7 +119,7 @@ def test_lost_transfers_are_named(tmp_path):
     ]
 
 
-def test_delay_is_named(tmp_path):
+def test_replay_reports_a_delayed_answer(tmp_path):
     recording = record(tmp_path / "a.rec", [(0, b"a")])
     device = Device()
     device.uart.on_byte = lambda byte: device.kernel.timeout(PS_PER_MS).callbacks.append(
@@ -143,7 +143,7 @@ def test_failed_transfer_is_recorded(tmp_path):
     assert difference.endswith("errno 6, recorded 5")
 
 
-def test_recording_of_other_ports(tmp_path):
+def test_replay_rejects_a_recording_of_other_ports(tmp_path):
     recording = Recording("x.rec", "cubesense", {"bench_uart": 9600})
     device = Device()
     with pytest.raises(ValueError, match=r"x\.rec has port bench_uart, this device has uart"):

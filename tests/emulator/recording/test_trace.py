@@ -37,7 +37,7 @@ def received(levels: list[tuple[int, object]]) -> bytes:
 
 
 @given(st.lists(st.tuples(st.integers(0, 10**9), st.binary(max_size=5)), max_size=4))
-def test_drawn_levels_are_the_bytes(writes):
+def test_traced_line_levels_encode_the_bytes(writes):
     desk, stream = Desk(BAUD), io.StringIO()
     kernel, uart = desk.kernel, desk.uart
     uart.on_byte = lambda byte: uart.send(bytes([byte ^ 0xFF]))
@@ -53,7 +53,7 @@ def test_drawn_levels_are_the_bytes(writes):
     assert received(changes["uart.tx"]) == bytes(byte ^ 0xFF for byte in sent)
 
 
-def test_characters_of_another_form_are_counted_in_a_word():
+def test_trace_counts_framing_errors_in_a_word():
     desk, stream = Desk(BAUD), io.StringIO()
     trace = VcdTrace(stream, "board", desk.kernel, {"uart": desk.uart})
     desk.uart.host_form = LineFormat(BAUD, parity="S")
@@ -67,7 +67,7 @@ def test_characters_of_another_form_are_counted_in_a_word():
     assert bits == {"rx": 1, "tx": 1, "rx_byte": 8, "tx_byte": 8, "framing_errors": 32}
 
 
-def test_probes_and_transfers():
+def test_trace_records_probes_and_i2c_transfers():
     kernel, stream, state = Kernel(), io.StringIO(), {"task": "IDLE", "n": 0}
     bus = I2cBus(kernel)
     bus.attach(0x1A, Memory(first=0x42))
@@ -90,7 +90,7 @@ def test_probes_and_transfers():
     assert [value for _, value in changes["i2c.busy"]] == [0, 1, 0]
 
 
-def test_trace_leaves_nothing_behind():
+def test_closed_trace_removes_its_taps():
     desk = Desk(BAUD)
     bus = I2cBus(desk.kernel)
     trace = VcdTrace(io.StringIO(), "board", desk.kernel, {"uart": desk.uart})
@@ -124,7 +124,7 @@ def strobed(engine: RtlEngine) -> list[int]:
 
 
 @pytest.mark.parametrize("clocks", [3, BYTES, 2 * BYTES])
-def test_every_data_clock_of_the_window_is_seen_and_the_bytes_stay(clocks: int) -> None:
+def test_scope_records_every_data_clock_without_changing_the_data(clocks: int) -> None:
     engine = reading()
     start = engine.now_ps
     scope = Scope(engine, PINS, start, start + clocks * PERIOD_PS, STEP_PS)
@@ -140,7 +140,7 @@ def test_every_data_clock_of_the_window_is_seen_and_the_bytes_stay(clocks: int) 
     assert engine.now_ps == start + 2 * BYTES * PERIOD_PS
 
 
-def test_a_closed_scope_leaves_no_mark() -> None:
+def test_closed_scope_does_not_change_the_simulation() -> None:
     engine, other = reading(), reading()
     now = engine.now_ps
     Scope(engine, PINS, now, now + PERIOD_PS, STEP_PS).close()
@@ -148,7 +148,7 @@ def test_a_closed_scope_leaves_no_mark() -> None:
     assert engine.now_ps == other.now_ps
 
 
-def test_a_window_that_is_over_is_refused() -> None:
+def test_scope_rejects_empty_or_past_windows() -> None:
     engine = reading()
     for start, end, step in ((0, 10**9, 1), (10**9, 10**9, 1), (10**9, 10**10, 0)):
         with pytest.raises(ValueError, match="empty or past scope window"):

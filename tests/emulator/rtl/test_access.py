@@ -91,7 +91,7 @@ def random_step(rng: np.random.Generator, wiring: Wiring) -> Step:
         *(pytest.param(top, marks=pytest.mark.slow) for top in WIRINGS if top != CubeStarShared),
     ],
 )
-def test_every_engine_makes_the_same_transactions(design) -> None:
+def test_all_engines_perform_the_same_bus_transactions(design) -> None:
     """At any time: beside pixels that are stored, in standby, over the ends of segments."""
     rng = np.random.default_rng(7)
     wiring = WIRINGS[design](design(COLUMNS, ROWS))
@@ -103,7 +103,7 @@ def test_every_engine_makes_the_same_transactions(design) -> None:
 
 
 @needs_compiler
-def test_a_bulk_read_of_full_size_is_the_read_pin_by_pin() -> None:
+def test_full_size_bulk_read_equals_pin_by_pin_read_during_a_store() -> None:
     """Beside a picture that is stored in the other memory, at every engine's own speed."""
     wiring = cubestar_double_wiring()
     found = []
@@ -142,7 +142,7 @@ def opened(engine: RtlEngine) -> RtlEngine:
     return engine
 
 
-def test_what_is_written_is_read_back_in_time(shared: RtlEngine) -> None:
+def test_bus_write_is_read_back_within_its_time(shared: RtlEngine) -> None:
     opened(shared)
     places, values = np.arange(64), np.arange(64)[::-1] * 3
     write = transactions(places, values)
@@ -155,7 +155,7 @@ def test_what_is_written_is_read_back_in_time(shared: RtlEngine) -> None:
     assert not shared.violation_counts
 
 
-def test_only_what_fits_is_made(shared: RtlEngine) -> None:
+def test_bus_access_performs_only_transactions_that_fit(shared: RtlEngine) -> None:
     opened(shared)
     read = transactions(np.arange(64))
     assert shared.access(read, int(10 * read.period)) == 10
@@ -164,7 +164,7 @@ def test_only_what_fits_is_made(shared: RtlEngine) -> None:
 
 
 @pytest.mark.parametrize("bulk", [True, False])
-def test_a_search_ends_with_the_first_byte_above(shared: RtlEngine, bulk: bool) -> None:
+def test_read_with_limit_ends_at_the_first_byte_above_it(shared: RtlEngine, bulk: bool) -> None:
     opened(shared).sram[:] = 6
     shared.sram[[17, 20]] = 7
     read = transactions(np.arange(64), above=6)
@@ -176,14 +176,14 @@ def test_a_search_ends_with_the_first_byte_above(shared: RtlEngine, bulk: bool) 
     assert shared.now_ps == int(18 * read.period)
 
 
-def test_a_read_that_nobody_answers_takes_what_the_lines_kept(shared: RtlEngine) -> None:
+def test_unanswered_read_returns_the_last_level_of_the_data_lines(shared: RtlEngine) -> None:
     shared.sram[:] = 0xA5
     read = transactions([0x123456])
     assert shared.access(read, 10**9) == 1
     assert read.data[0] == 0x34
 
 
-def test_a_strobe_too_short_for_the_memory_is_noticed(shared: RtlEngine) -> None:
+def test_read_strobe_too_short_for_the_memory_is_a_violation(shared: RtlEngine) -> None:
     """The limits are those of the memory: a core clock of 100 MHz leaves it 10 ns."""
     opened(shared)
     fast = BusTiming(1, 1, 1, 1, 1)
@@ -194,7 +194,7 @@ def test_a_strobe_too_short_for_the_memory_is_noticed(shared: RtlEngine) -> None
     assert shared.violation_counts["read-access"] == 1
 
 
-def test_errors_say_what_would_be_right(shared: RtlEngine) -> None:
+def test_bus_access_errors_state_the_accepted_values(shared: RtlEngine) -> None:
     with pytest.raises(ValueError, match="no chip select has number 1; they are CS_N"):
         shared.access(transactions([1], select=1), 10**9)
     with pytest.raises(ValueError, match="CubeStarTop has no external bus"):
@@ -224,13 +224,13 @@ def engine(wiring: Wiring) -> Iterator[CompiledEngine]:
 
 
 @pytest.mark.parametrize("wiring", [cubestar_wiring(), cubesense_wiring(CubeSensePair())])
-def test_registers_have_the_names_of_the_design(engine: CompiledEngine) -> None:
+def test_engine_registers_have_the_names_of_the_design(engine: CompiledEngine) -> None:
     assert all(bits > 0 for bits in engine.registers.values())
     names = {name.rsplit(".", 1)[-1] for name in engine.registers}
     assert names > {"row", "column", "store", "ack"}
 
 
-def test_every_bit_of_a_running_reader_moves_the_address(engine: CompiledEngine) -> None:
+def test_flipping_any_reader_counter_bit_changes_one_address_bit(engine: CompiledEngine) -> None:
     opened(engine)
     for _ in range(3):
         engine.set_pin("DCLK", 1)
@@ -244,7 +244,7 @@ def test_every_bit_of_a_running_reader_moves_the_address(engine: CompiledEngine)
             assert engine.get_pin("SRAM_A") == before
 
 
-def test_a_bit_turns_over_in_the_middle_of_a_transfer(engine: CompiledEngine) -> None:
+def test_flipped_counter_bit_shifts_the_addresses_in_mid_transfer(engine: CompiledEngine) -> None:
     memory = next(iter(engine.memories.values())).reshape(-1)
     memory[:] = np.random.default_rng(1).integers(0, 256, memory.size)
     opened(engine)

@@ -61,7 +61,7 @@ def read(engine: RtlEngine, count: int) -> np.ndarray:
     return out
 
 
-def test_reset_state(engine):
+def test_engine_pins_have_their_reset_levels(engine):
     levels = {name: engine.get_pin(name) for name in OUTPUT_PINS}
     active_low = {"SRAM_CE_N", "SRAM_OE_N", "SRAM_WE_N"}
     assert levels == {name: int(name in active_low) for name in OUTPUT_PINS}
@@ -89,7 +89,7 @@ def test_stores_and_acknowledges_the_next_whole_frame(engine, camera, bank, enab
 
 
 @pytest.mark.parametrize(("early_ps", "frame"), [(0, 1), (1, 0)])
-def test_pixel_clock_comes_first_at_one_instant(engine, camera, early_ps, frame):
+def test_pixel_clock_edge_precedes_pin_changes_at_equal_times(engine, camera, early_ps, frame):
     """Two edges release the reset, a third must see HSYNC low: this one comes just too late."""
     engine.run((BLANK - 3) * PERIOD - early_ps)
     engine.attach(camera)
@@ -97,13 +97,13 @@ def test_pixel_clock_comes_first_at_one_instant(engine, camera, early_ps, frame)
     assert engine.run(10 * FRAME, ("ACK", 1)) == FIRST_ACK + frame * FRAME
 
 
-def test_pixel_clock_level_while_blank(storing):
+def test_pixel_clock_toggles_during_blanking(storing):
     for offset_ps, level in [(-1, 0), (0, 1), (PERIOD // 2 - 1, 1), (PERIOD // 2, 0)]:
         storing.run(25 * PERIOD + offset_ps)
         assert storing.get_pin("PIXCLK") == level
 
 
-def test_run_that_meets_no_stop_ends_on_time(storing):
+def test_run_without_a_stop_event_ends_on_time(storing):
     assert storing.run(FIRST_ACK - 1, ("ACK", 1)) == FIRST_ACK - 1
     assert storing.get_pin("ACK") == 0
     assert storing.run(FIRST_ACK) == FIRST_ACK
@@ -146,7 +146,7 @@ def test_pixels_are_rendered_only_while_they_may_be_stored(engine):
     assert camera.rendered == [1]
 
 
-def test_changed_stream_is_followed_from_now_on(engine):
+def test_changed_pixel_stream_takes_effect_immediately(engine):
     camera, other = plain_camera(seed=1), plain_camera(seed=2)
     engine.attach(camera)
     engine.set_pin("ENABLE", 1)
@@ -161,7 +161,7 @@ def test_changed_stream_is_followed_from_now_on(engine):
 
 
 @pytest.mark.parametrize("offset_ps", [-1, 0, 1, PERIOD // 2 - 1, PERIOD // 2, PERIOD // 2 + 1])
-def test_asking_the_source_again_makes_no_clock_more_or_less(storing, camera, offset_ps):
+def test_re_reading_the_pixel_source_adds_or_loses_no_clock(storing, camera, offset_ps):
     storing.run((BLANK + LINE + 3) * PERIOD + offset_ps)
     storing.stream_changed()
     assert storing.run(10 * FRAME, ("ACK", 1)) == FIRST_ACK
@@ -169,7 +169,7 @@ def test_asking_the_source_again_makes_no_clock_more_or_less(storing, camera, of
     assert not storing.violations
 
 
-def test_camera_connected_in_a_high_half_makes_no_edge_of_it(engine):
+def test_camera_connected_during_a_high_clock_creates_no_edge(engine):
     engine.run(5 * PERIOD + 10)
     engine.attach(plain_camera())
     engine.run(5 * PERIOD + 20)
@@ -178,7 +178,7 @@ def test_camera_connected_in_a_high_half_makes_no_edge_of_it(engine):
     assert engine.get_pin("PIXCLK") == 1
 
 
-def test_stream_that_stops_and_comes_back(engine, camera):
+def test_engine_resumes_after_the_pixel_stream_stopped(engine, camera):
     segments, camera.segments = camera.segments, []
     engine.attach(camera)
     engine.set_pin("ENABLE", 1)
@@ -197,7 +197,7 @@ def test_strobes_keep_their_rate_over_bursts(engine):
     assert engine.now_ps == int(77 * period)
 
 
-def test_every_rising_data_clock_is_on_the_grid(reading):
+def test_strobe_read_clocks_are_on_one_time_grid(reading):
     """Told by the violations of reading too fast."""
     period = Fraction(22_001, 3)
     for count in (3, 1, 2, 5, 4):
@@ -216,7 +216,7 @@ def test_burst_after_a_pause_starts_its_own_count(engine):
 
 
 @pytest.mark.parametrize(("reach", "cycles"), [(-5, 0), (0, 0), (999, 0), (1000, 1), (3999, 3)])
-def test_only_cycles_that_end_in_time_are_made(engine, reach, cycles):
+def test_strobe_read_makes_only_cycles_that_end_in_time(engine, reach, cycles):
     out = np.zeros(9, np.uint8)
     engine.run(10_000)
     assert engine.strobe_read(out, Fraction(1000), 10_000 + reach) == cycles
@@ -232,7 +232,7 @@ def test_reading_faster_than_the_memory_is_a_violation(reading):
     assert len(reading.violations) == 64
 
 
-def test_write_pulse_cut_short_by_enable(storing):
+def test_enable_that_cuts_a_write_pulse_is_a_violation(storing):
     fall = BLANK * PERIOD + PERIOD // 2
     storing.run(fall + 3_000)
     storing.set_pin("ENABLE", 0)
@@ -251,7 +251,7 @@ def test_apply_shows_every_output_after_every_event(engine):
     assert engine.now_ps == 30
 
 
-def test_wrong_calls_name_the_offender(engine):
+def test_wrong_engine_calls_name_the_cause(engine):
     engine.run(100)
     with pytest.raises(ValueError, match="run to 99 ps: the time is already 100 ps"):
         engine.run(99)
@@ -277,13 +277,13 @@ def test_wrong_calls_name_the_offender(engine):
         ("clocks", ROWS * LINE + 1, "48 clocks, not 49"),
     ],
 )
-def test_segments_that_do_not_fit_are_refused(storing, camera, field, wrong, found):
+def test_engine_rejects_inconsistent_segments(storing, camera, field, wrong, found):
     setattr(camera.segments[1], field, wrong)
     with pytest.raises(ValueError, match=found):
         storing.run(FRAME)
 
 
-def test_closed_compiled_engine_says_so():
+def test_closed_compiled_engine_raises_runtime_error():
     engine = make_engine(cubestar_wiring(CubeStarTop(COLUMNS, ROWS)), "compiled")
     engine.close()
     with pytest.raises(RuntimeError, match="the engine is closed"):

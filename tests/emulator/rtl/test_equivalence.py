@@ -65,7 +65,7 @@ def random_step(rng: np.random.Generator, camera: object, span_ps: int) -> Step:
 
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("seed", quick(range(15), 5))
-def test_random_life_of_a_board(size, seed):
+def test_engines_agree_over_random_operation(size, seed):
     rng = np.random.default_rng([seed, *size])
     camera = random_camera(rng, *size)
     line_ps = int(camera.line_clocks * camera.period)
@@ -77,7 +77,7 @@ def test_random_life_of_a_board(size, seed):
 
 
 @pytest.mark.parametrize("seed", quick(range(16), 8))
-def test_captures_and_reads_back(seed):
+def test_engines_agree_on_captures_and_reads(seed):
     """Long enough for whole frames to be stored, in either bank, with ENABLE at any moment."""
     size = SIZES[seed % len(SIZES)]
     rng = np.random.default_rng(seed)
@@ -121,14 +121,14 @@ def random_events(rng: np.random.Generator, count: int) -> list[PinEvent]:
 
 
 @pytest.mark.parametrize("seed", quick(range(6), 3))
-def test_pin_by_pin(seed):
+def test_engines_agree_on_random_pin_events(seed):
     all_engines = engines(wiring(SIZES[seed % len(SIZES)]))
     outputs = assert_same_outputs(all_engines, random_events(np.random.default_rng(seed), 3000))
     assert len(np.unique(outputs[:, OUTPUT_PINS.index("SRAM_A")])) > 10
     assert all_engines[-1].violations
 
 
-def test_low_lines_are_really_skipped():
+def test_compiled_engine_skips_an_hour_of_blanking():
     """An hour of blanking costs nothing, and the frame behind it is stored all the same."""
     camera = plain_camera(blank=36_000_000_000)
     engine = make_engine(cubestar_wiring(CubeStarTop(*SIZES[0])), "compiled")
@@ -139,7 +139,7 @@ def test_low_lines_are_really_skipped():
     assert (engine.sram[:32] == camera.images[0].ravel()).all()
 
 
-def test_other_limits_reach_the_model():
+def test_memory_timing_limits_reach_both_engines():
     slow = SramTiming(write_pulse_ps=60_000, data_setup_ps=110_000)
     counts = []
     for kind in ("compiled", "python"):

@@ -82,7 +82,7 @@ PARTS = [0.2, 0.2, 0.2, 0.25, 0.08, 0.04, 0.03]
 
 
 @pytest.mark.parametrize("seed", quick(range(12), 1))
-def test_random_life_of_a_board(seed):
+def test_pair_engines_agree_over_random_operation(seed):
     rng = np.random.default_rng(seed)
     number = seed % len(SIZES)
     cameras = {side: pair_camera(rng, SIZES[number], frames=40) for side in SIDES}
@@ -110,7 +110,7 @@ def random_events(rng: np.random.Generator, count: int) -> list[PinEvent]:
 
 
 @pytest.mark.parametrize("seed", quick(range(3), 1))
-def test_pin_by_pin(seed):
+def test_pair_engines_agree_on_random_pin_events(seed):
     """With limits so wide that many writes and reads break them."""
     wiring = WIRINGS[seed % len(WIRINGS)]
     all_engines = engines(wiring, SramTiming(30_000, 20_000, 20_000, 30_000, 60_000))
@@ -121,7 +121,7 @@ def test_pin_by_pin(seed):
 
 
 @pytest.mark.parametrize("kind", ["compiled", "python"])
-def test_at_one_instant_the_first_camera_comes_first(kind):
+def test_first_camera_acknowledges_first_at_equal_times(kind):
     """Told by the violations: with these limits every write is one."""
     size = SIZES[0]
     engine = make_engine(WIRINGS[0], kind, SramTiming(write_pulse_ps=10**9))
@@ -139,7 +139,7 @@ def test_at_one_instant_the_first_camera_comes_first(kind):
 
 
 @pytest.mark.parametrize("kind", ["compiled", "python"])
-def test_two_drivers_on_one_wire_are_recorded_each_time(kind):
+def test_wire_contention_is_recorded_each_time(kind):
     """The designs never do that, so another output replaces CONTENTION."""
     wiring = replace(cubestar_wiring(CubeStarTop(3, 2)), contention="SRAM_CE_N")
     engine = make_engine(wiring, kind)
@@ -153,7 +153,7 @@ def test_two_drivers_on_one_wire_are_recorded_each_time(kind):
     ]
 
 
-def test_low_lines_and_unused_cameras_are_really_skipped():
+def test_compiled_engine_skips_blanking_and_unused_cameras():
     """An hour between frames costs nothing, nor does a camera that nobody stores, nor a scan."""
     size = SIZES[0]
     slow = plain_camera(size.columns, size.rows, blank=36_000_000_000)
@@ -173,7 +173,7 @@ def test_low_lines_and_unused_cameras_are_really_skipped():
     assert quick.rendered == []
 
 
-def test_skipped_clocks_run_when_the_other_camera_stops_the_run():
+def test_skipped_clocks_are_run_if_the_other_camera_stops_the_run():
     """The nadir's gap is skipped when the sun acknowledges in it, and then cut by standby."""
     size = SIZES[0]
     sun = plain_camera(size.columns, size.rows, frames=1, blank=20)

@@ -32,7 +32,7 @@ def make(kind: Any, **options: Any) -> Any:
 
 
 @pytest.mark.parametrize("skipping", [True, False])
-def test_engines_with_a_compiler(engines: dict[str, Any], skipping: bool) -> None:
+def test_engine_kinds_resolve_with_a_compiler(engines: dict[str, Any], skipping: bool) -> None:
     timing = SramTiming()
     options = {"sram_timing": timing, "skipping": skipping}
     for kind, name, skips in (
@@ -44,7 +44,7 @@ def test_engines_with_a_compiler(engines: dict[str, Any], skipping: bool) -> Non
         assert make(kind, **options) == (name, "wiring", timing, {"skipping": skips})
 
 
-def test_without_a_compiler_only_auto_goes_on_and_says_so(engines: dict[str, Any]) -> None:
+def test_only_auto_falls_back_with_a_warning_without_a_compiler(engines: dict[str, Any]) -> None:
     engines["fails"] = NoCompilerError("no compiler")
     with pytest.warns(UserWarning, match="no compiler; using the Amaranth simulator") as caught:
         assert make("auto")[0] == "python"
@@ -61,7 +61,7 @@ def test_reports_failed_compiler(engines: dict[str, Any]) -> None:
         make("auto")
 
 
-def test_the_first_build_alone_is_timed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_cold_build_time_covers_the_compilation_only(monkeypatch: pytest.MonkeyPatch) -> None:
     """Not how long it took to elaborate the design."""
     clock, compiler = SimpleNamespace(now_s=100.0), object()
 
@@ -80,7 +80,7 @@ def test_the_first_build_alone_is_timed(monkeypatch: pytest.MonkeyPatch) -> None
     assert benchmark.cold_build_s(None) == 2.5
 
 
-def test_without_a_compiler_there_is_no_build_to_time(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_build_is_not_timed_without_a_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(benchmark, "find_compiler", lambda: None)
     with pytest.raises(NoCompilerError, match="no C\\+\\+ compiler to measure"):
         benchmark.cold_build_s(None)

@@ -48,7 +48,7 @@ def star(folder: Path, top: CubeStarTop, camera: ListCamera) -> Star:
 
 
 @pytest.mark.parametrize("bank", [0, 1])
-def test_small_frames_joined_anywhere(bank, tmp_path):
+def test_icarus_stores_small_frames_enabled_at_any_clock(bank, tmp_path):
     """ENABLE rises in one clock after the other of the first frame and its blanking."""
     top = CubeStarTop(5, 3)
     camera = plain_camera(5, 3, period=Fraction(10**12, 11_000_000), frames=3, blank=5)
@@ -67,7 +67,7 @@ def test_small_frames_joined_anywhere(bank, tmp_path):
 
 
 @pytest.mark.slow
-def test_one_full_frame(tmp_path):
+def test_full_frame_store_and_read_matches_icarus(tmp_path):
     """1024 x 512 pixels of 1322 clocks a line at 10 MHz, stored and read back to the last byte."""
     top = CubeStarTop()
     camera = plain_camera(1024, 512, frames=1, line_clocks=1322, blank=40)

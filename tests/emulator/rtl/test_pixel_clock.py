@@ -39,7 +39,7 @@ def loaded(**changes: Any) -> LoadedSegment:
     return LoadedSegment.of(Source(), replace(Segment(), **changes))
 
 
-def test_edges_are_floors_of_half_periods() -> None:
+def test_pixel_clock_edges_are_at_rounded_down_half_periods() -> None:
     one = loaded()
     assert one.edges == 36
     times = [int(1001 + k * Fraction(1000, 14)) for k in range(37)]
@@ -50,7 +50,7 @@ def test_edges_are_floors_of_half_periods() -> None:
         assert one.first_edge(time_ps) == following
 
 
-def test_samples_are_the_lines_and_then_low() -> None:
+def test_pixel_clock_samples_lines_then_low() -> None:
     one = loaded()
     lines = np.zeros((3, 6), int)
     lines[:, :4] = 1
@@ -79,7 +79,7 @@ def test_blanking_is_low_throughout() -> None:
         ({"clocks": 0, "rows": 0}, "a segment needs at least one clock, not 0"),
     ],
 )
-def test_segments_that_do_not_fit(changes: dict[str, int], words: str) -> None:
+def test_segment_rejects_inconsistent_clock_counts(changes: dict[str, int], words: str) -> None:
     with pytest.raises(ValueError, match=words):
         loaded(**changes)
     assert loaded(clocks=1, rows=0).edges == 2
@@ -94,13 +94,13 @@ def test_segments_that_do_not_fit(changes: dict[str, int], words: str) -> None:
         (lambda: np.asfortranarray(IMAGE), "pixels must be C-contiguous"),
     ],
 )
-def test_pixels_that_do_not_fit(pixels: Any, words: str) -> None:
+def test_segment_rejects_pixels_of_wrong_shape_or_type(pixels: Any, words: str) -> None:
     with pytest.raises(ValueError, match=words):
         loaded(pixels=pixels).render()
 
 
 @pytest.mark.parametrize("blank", [0, 5])
-def test_a_repeated_frame_follows_itself_without_a_gap(blank: int) -> None:
+def test_repeated_frames_follow_each_other_without_a_gap(blank: int) -> None:
     camera = RepeatedFrame(IMAGE, Fraction(1000, 7), 6, blank)
     assert (camera.active_columns, camera.clocks) == (4, 18 + blank)
     now, clocks, kinds = 0, 0, []

@@ -61,7 +61,7 @@ def test_write_takes_effect_at_the_end_of_the_pulse():
 
 
 @pytest.mark.parametrize("ends", [idle(5, 0xA5), SramPins(5, ce_n=1, we_n=0, data=0xA5)])
-def test_short_write_pulse(ends):
+def test_short_write_pulse_is_a_violation(ends):
     sram = make((START, writing(5)))
     end = START + T.write_pulse_ps - 1
     sram.drive(end, ends)
@@ -69,14 +69,14 @@ def test_short_write_pulse(ends):
     assert sram.violations.kept[0].detail == "write pulse of 7999 ps, at least 8000 ps needed"
 
 
-def test_address_moving_inside_a_pulse_writes_both():
+def test_address_change_during_a_write_pulse_writes_both_addresses():
     sram = make((START, writing(5)), (START + 10_000, writing(6)), (START + 20_000, idle(6)))
     assert found(sram) == [("address-changed-during-write", START + 10_000, 5)]
     assert sram.memory[5] == sram.memory[6] == 0xA5
 
 
 @pytest.mark.parametrize(("early", "broken"), [(6_000, False), (5_999, True)])
-def test_data_setup(early, broken):
+def test_data_setup_time_violation_is_reported(early, broken):
     sram = make(
         (START, writing(5, 0x11)),
         (START + 50_000 - early, writing(5, 0x22)),
@@ -86,7 +86,7 @@ def test_data_setup(early, broken):
     assert sram.memory[5] == 0x22
 
 
-def test_writing_a_floating_bus():
+def test_writing_a_floating_bus_is_a_data_setup_violation():
     sram = make((START, writing(5, None)), (START + 50_000, idle(5)))
     assert found(sram) == [("data-setup", START + 50_000, 5)]
 
@@ -97,7 +97,7 @@ def test_writing_a_floating_bus():
     ids=["address", "chip enable", "output enable"],
 )
 @pytest.mark.parametrize("late", [0, 1])
-def test_read_access(before, limit, late):
+def test_memory_read_access_time_is_checked(before, limit, late):
     sram = make((0, before), (START, reading(7)))
     assert sram.sample(START + limit - late) == 7
     assert found(sram) == [("read-access", START + limit - 1, 7)] * late
@@ -118,7 +118,7 @@ def test_bus_contention_is_reported_once(first):
 
 
 @pytest.mark.parametrize(("pause", "broken"), [(6_000, False), (5_999, True)])
-def test_turnaround(pause, broken):
+def test_bus_turnaround_time_is_checked(pause, broken):
     sram = make((0, reading(7)), (START, idle(7)), (START + pause, idle(7, 0x33)))
     assert found(sram) == [("turnaround", START + pause, 7)] * broken
 
@@ -144,7 +144,7 @@ def test_violations_are_all_counted_and_the_first_are_kept_and_logged(caplog):
     ]
 
 
-def test_memory_without_supply_keeps_its_bytes_offers_0_and_breaks_no_rule():
+def test_unpowered_memory_reads_0_and_reports_no_violation():
     sram = make((START, writing(5)))
     sram.power(False)
     for offset, pins in enumerate([writing(6), reading(6), writing(7, None), idle(7), reading(9)]):
@@ -168,7 +168,7 @@ def test_memories_may_share_a_log():
     assert log.counts == {"read-access": 2}
 
 
-def test_every_rule_can_be_broken_alone():
+def test_every_memory_timing_rule_has_a_test():
     """The names of this file are those of the model, but for the engine's own."""
     alone = "short-write-pulse address-changed-during-write data-setup read-access bus-contention"
     assert set(RULES) - {"wire-contention"} == {*alone.split(), "turnaround"}
@@ -221,7 +221,7 @@ def random_pins(rng: np.random.Generator, old: SramPins) -> SramPins:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_same_as_the_python_model(library, seed):
+def test_compiled_memory_model_equals_the_python_model(library, seed):
     rng = np.random.default_rng(seed)
     timing = SramTiming(*(int(limit) for limit in rng.integers(1_000, 20_000, 5)))
     keep = 10**6

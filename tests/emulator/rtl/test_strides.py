@@ -60,7 +60,7 @@ def step(engines: list[CompiledEngine], act: Callable[[RtlEngine], object], what
 
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("board", BOARDS)
-def test_a_picture_is_stored_alike(board: Callable[[], Wiring], seed: int) -> None:
+def test_both_engines_store_the_same_image(board: Callable[[], Wiring], seed: int) -> None:
     rng = np.random.default_rng(seed)
     # Rows of the picture's length, too long, too short.
     columns = (COLUMNS, COLUMNS, COLUMNS + 9, COLUMNS - 200)[seed]
@@ -82,7 +82,7 @@ def test_a_picture_is_stored_alike(board: Callable[[], Wiring], seed: int) -> No
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_bytes_are_read_alike(seed: int) -> None:
+def test_both_engines_read_the_same_bytes(seed: int) -> None:
     rng = np.random.default_rng(seed)
     with both(cubestar_wiring()) as engines:
         engines[0].sram[:] = engines[1].sram[:] = rng.integers(0, 256, 2 * COLUMNS * ROWS)
@@ -103,7 +103,7 @@ def test_bytes_are_read_alike(seed: int) -> None:
 
 
 @pytest.mark.parametrize("timing", SLOW_PARTS)
-def test_slow_memory_violates_the_same_rules(timing: SramTiming) -> None:
+def test_both_engines_report_the_same_violations_of_a_slow_memory(timing: SramTiming) -> None:
     rng = np.random.default_rng(1)
     source = camera(rng, 12)
     with both(cubestar_wiring(), timing) as engines:

@@ -34,13 +34,13 @@ def test_every_input_has_one_driver():
     assert PAIR.initial["SUNEN"] == PAIR.initial["NADEN"] == 1
 
 
-def test_address_pins_of_the_microcontroller_come_with_the_option():
+def test_mcu_address_pins_exist_only_with_the_addressing_option():
     assert "DATA_I" not in PAIR.mcu_pins
     assert "DATA_I" in ADDRESSING.mcu_pins
     assert ADDRESSING.widths["DATA_I"] == 8
 
 
-def test_a_camera_is_stored_in_the_ways_to_store_until_the_acknowledge():
+def test_camera_is_stored_only_for_store_levels_until_its_acknowledge():
     cameras = [("sun",), ("nadir",), ("sun", "nadir"), ("sun",), ("nadir",)]
     used = {levels: names for (levels, _), names in zip(stores(), cameras, strict=True)}
     memories = dict(stores())
@@ -53,7 +53,7 @@ def test_a_camera_is_stored_in_the_ways_to_store_until_the_acknowledge():
 
 
 @pytest.mark.parametrize("kind", ["compiled", "python"])
-def test_wrong_names_and_levels(kind):
+def test_engine_rejects_unknown_names_and_levels(kind):
     engine = make_engine(PAIR, kind)
     with pytest.raises(ValueError, match="unknown camera moon; cameras: sun, nadir"):
         engine.attach(None, "moon")
@@ -90,7 +90,7 @@ class Device:
 
 @pytest.mark.parametrize("write", [False, True])
 @pytest.mark.parametrize("select", [0, 1])
-def test_a_latch_and_a_memory_understand_the_bus(write, select):
+def test_ebi_pin_sequence_matches_the_address_latch_and_memory(write, select):
     pins = BusPins(("A_CS", "B_CS"), "AH", "AL", "ALE", "RE", "WE")
     addresses = np.array([0x123456, 0x00FF01, 0xABCDEF, 0], np.int32)
     data = np.array([0x5A, 1, 0xFF, 0x80], np.uint8)

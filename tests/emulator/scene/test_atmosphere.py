@@ -29,7 +29,7 @@ def seen(air: Atmosphere, stars: Vectors, exposure_s: float = 0.4, seed: int = 1
     return air.apparent(stars, 0.0, exposure_s, 5.0, np.random.default_rng(seed))
 
 
-def test_air_mass_and_refraction_are_those_of_the_tables() -> None:
+def test_air_mass_and_refraction_match_published_tables() -> None:
     # Kasten and Young, table II; Bennett's and Saemundsson's refraction at true heights.
     heights = np.array([90, 60, 30, 10, 0.0])
     masses = [0.99971, 1.1539, 1.9939, 5.5841, 37.92]
@@ -51,14 +51,14 @@ def test_refraction_lifts_towards_the_zenith_and_less_up_a_mountain() -> None:
     np.testing.assert_allclose(part, np.exp(-0.5), rtol=1e-3)
 
 
-def test_extinction_is_by_air_mass_and_nothing_shines_through_the_ground() -> None:
+def test_extinction_follows_air_mass_and_blocks_light_below_the_horizon() -> None:
     air = Atmosphere(0, 90, seeing_arcsec=0, scintillation=False, extinction_mag=0.3)
     _, light = seen(air, stars_at([90, 30, 5, -1]))
     np.testing.assert_allclose(-2.5 * np.log10(light[:3]), 0.3 * air_mass(np.array([90, 30, 5])))
     assert light[3] == 0
 
 
-def test_stars_twinkle_as_youngs_formula_says() -> None:
+def test_scintillation_follows_youngs_formula() -> None:
     stars = np.repeat(stars_at([90.0, 40.0]), 20_000, axis=0)
     air = Atmosphere(0, 90, 0.0, 0, extinction_mag=0)
     for exposure_s in (0.1, 0.9):
@@ -85,7 +85,7 @@ def test_images_move_by_the_seeing_and_less_in_longer_exposures() -> None:
     np.testing.assert_allclose(arcsec(2, 0.8) / arcsec(2, 0.1), 8 ** (-1 / 6), rtol=0.03)
 
 
-def test_an_exposure_has_its_own_air() -> None:
+def test_atmosphere_repeats_with_the_seed_and_differs_between_seeds() -> None:
     stars = stars_at([60.0, 50.0])
     one, same, other = (seen(Atmosphere(0, 90), stars, seed=seed) for seed in (1, 1, 2))
     np.testing.assert_array_equal(one[0], same[0])
@@ -94,7 +94,7 @@ def test_an_exposure_has_its_own_air() -> None:
     assert np.all(one[1] != other[1])
 
 
-def test_sidereal_time_and_a_camera_on_the_earth() -> None:
+def test_ground_camera_turns_with_sidereal_time() -> None:
     # Meeus, Astronomical Algorithms, example 12.b: 8 h 34 min 57.0896 s at Greenwich.
     when = datetime(1987, 4, 10, 19, 21, tzinfo=UTC)
     assert sidereal_deg(when, 0) == pytest.approx(128.7378734, abs=2e-4)

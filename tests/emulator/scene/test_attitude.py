@@ -13,7 +13,7 @@ def quaternions() -> list[np.ndarray]:
     return special + near + [attitude.random_quaternion(generator) for _ in range(200)]
 
 
-def test_matrix_is_scipys_and_its_quaternion_comes_back(quaternions: list[np.ndarray]) -> None:
+def test_quaternion_matrix_conversions_match_scipy(quaternions: list[np.ndarray]) -> None:
     for q in quaternions:
         matrix = attitude.matrix_from_quaternion(q)
         np.testing.assert_allclose(matrix, Rotation.from_quat(q).as_matrix(), atol=1e-14)
@@ -22,7 +22,7 @@ def test_matrix_is_scipys_and_its_quaternion_comes_back(quaternions: list[np.nda
         assert min(np.abs(back - unit).max(), np.abs(back + unit).max()) < 1e-14
 
 
-def test_pointing_at_orion() -> None:
+def test_pointing_matrix_has_north_up_and_east_left() -> None:
     # Looking at the celestial equator at 6 h with north up: east is left, so west is camera x.
     a = attitude.matrix_from_pointing(90.0, 0.0, 0.0)
     np.testing.assert_allclose(a @ [0, 1, 0], [0, 0, 1], atol=1e-15)  # boresight
@@ -33,7 +33,7 @@ def test_pointing_at_orion() -> None:
     np.testing.assert_allclose(rolled @ [-1, 0, 0], [0, -1, 0], atol=1e-15)  # east is up
 
 
-def test_pointing_comes_back() -> None:
+def test_pointing_round_trips_through_matrix_and_quaternion() -> None:
     generator = np.random.default_rng(2)
     for ra, dec, roll in generator.uniform([0, -89.9, -180], [360, 89.9, 180], (200, 3)):
         a = attitude.matrix_from_pointing(ra, dec, roll)
@@ -54,7 +54,7 @@ def test_stars_move_opposite_to_the_camera() -> None:
     np.testing.assert_allclose(star, [0, np.sin(np.radians(2)), np.cos(np.radians(2))], atol=1e-15)
 
 
-def test_propagation_against_many_small_steps() -> None:
+def test_propagation_equals_many_small_steps() -> None:
     generator = np.random.default_rng(3)
     for _ in range(20):
         q, rate = attitude.random_quaternion(generator), generator.normal(0, 5, 3)
@@ -68,7 +68,7 @@ def test_propagation_against_many_small_steps() -> None:
     np.testing.assert_allclose(attitude.propagate(q, [0, 0, 0], 1e6), q, atol=1e-15)
 
 
-def test_errors_of_known_turns() -> None:
+def test_attitude_error_separates_cross_axis_and_roll() -> None:
     generator = np.random.default_rng(4)
     for _ in range(50):
         truth = attitude.random_quaternion(generator)

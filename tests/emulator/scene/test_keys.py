@@ -110,7 +110,7 @@ def test_rejects_every_key_of_another_type_by_name(tmp_path: Path, kind: str) ->
 
 
 @pytest.mark.parametrize("kind", BASE)
-def test_no_number_is_too_large(tmp_path: Path, kind: str) -> None:
+def test_scene_keys_tolerate_or_reject_huge_numbers(tmp_path: Path, kind: str) -> None:
     """A huge one is rejected by its name, or by that of what follows from it, or does no harm."""
     for name, _key, table in numbers(kind):
         for value in (HUGE, -HUGE):
@@ -119,14 +119,14 @@ def test_no_number_is_too_large(tmp_path: Path, kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", BASE)
-def test_limits_themselves_are_inside(tmp_path: Path, kind: str) -> None:
+def test_scene_keys_accept_their_limits(tmp_path: Path, kind: str) -> None:
     for name, key, table in numbers(kind):
         for limit in (key[end] for end in ("low", "high") if end in key):
             said = complaint(tmp_path, kind, table(limit))  # of another key, or that 0 is too small
             assert f"{name} must be {key['low']:.10g} to" not in said
 
 
-def test_defaults_are_what_a_file_without_them_gives(tmp_path: Path) -> None:
+def test_scene_key_defaults_match_a_file_without_those_keys(tmp_path: Path) -> None:
     for kind in BASE:
         view = load(tmp_path, kind, {})
         for name, key in KINDS[kind].items():
@@ -163,11 +163,11 @@ def test_every_key_has_a_meaning_and_a_type() -> None:
         {"text": 'quotes " and \\ and \x00 \x7f \n é 😀 ]\n[hazards]'},
     ],
 )
-def test_it_reads_as_the_same_table(table: dict[str, Any]) -> None:
+def test_toml_text_round_trips(table: dict[str, Any]) -> None:
     assert tomllib.loads(toml_text(table)) == table
 
 
-def test_a_moment_becomes_one() -> None:
+def test_utc_text_is_written_as_a_toml_datetime() -> None:
     (moment,) = tomllib.loads(toml_text({"utc": "2013-02-01T20:00:00Z"})).values()
     assert moment.isoformat() == "2013-02-01T20:00:00+00:00"
 

@@ -43,7 +43,7 @@ def orbit(**changes: Any) -> Orbit:
     return replace(Orbit(circular(START, 600, 97.8, 20, 180), START), **changes)
 
 
-def test_the_published_case_comes_out() -> None:
+def test_orbit_reproduces_the_published_test_case() -> None:
     satellite = Satrec.twoline2rv(*VALLADO, WGS72)
     start = datetime(2000, 6, 27, 18, 50, 19, 733568, tzinfo=UTC)  # day 179.78495062
     around = Orbit(satellite, start).surroundings(0.0)
@@ -58,7 +58,7 @@ def test_precession_turns_the_pole_as_published() -> None:
     assert precession(2451545.0) == pytest.approx(np.eye(3))
 
 
-def test_precession_is_that_of_another_library() -> None:
+def test_precession_matrix_equals_erfa() -> None:
     """1900-01-01 by ERFA's pmat76."""
     expected = [
         [0.9997029109769726, 0.0223527366106469, 0.0097182792781790],
@@ -68,7 +68,7 @@ def test_precession_is_that_of_another_library() -> None:
     np.testing.assert_allclose(precession(2415020.0), expected, atol=2e-9)
 
 
-def test_the_moons_terms_are_the_greatest_of_the_long_series() -> None:
+def test_moon_terms_are_the_largest_of_the_full_series() -> None:
     """Meeus, Astronomical Algorithms, chapter 47: the same series with more terms and digits."""
     long = {
         "longitude": {
@@ -115,7 +115,7 @@ def test_the_moons_terms_are_the_greatest_of_the_long_series() -> None:
         assert np.sqrt(np.mean(off**2)) < rms
 
 
-def test_the_moons_distance_swings_in_step_with_its_arguments() -> None:
+def test_moon_distance_varies_in_phase_with_its_arguments() -> None:
     """By the angles of the long series, which are rounded to 0.1 deg here."""
     dates = 2451545.0 + np.linspace(-18_000, 18_000, 400)
     t = (dates - 2451545.0) / 36525
@@ -127,7 +127,7 @@ def test_the_moons_distance_swings_in_step_with_its_arguments() -> None:
         assert late_deg == pytest.approx(0.0, abs=0.06)
 
 
-def test_the_moon_is_where_the_text_book_has_it() -> None:
+def test_moon_position_matches_a_textbook_example() -> None:
     """Meeus, Astronomical Algorithms, example 47.a: 1992 April 12, 0 h TD."""
     tilt = np.radians(23.440636)
     x, y, z = moon(2448724.5)
@@ -142,7 +142,7 @@ def test_the_moon_is_where_the_text_book_has_it() -> None:
 
 
 @pytest.mark.parametrize(("when", "dec_deg"), [((3, 20, 14, 46), 0.0), ((6, 21, 8, 24), 23.44)])
-def test_the_sun_is_on_the_equator_at_an_equinox(when: Any, dec_deg: float) -> None:
+def test_sun_is_on_the_equator_at_an_equinox(when: Any, dec_deg: float) -> None:
     """Equinox and solstice of 2026, by the almanacs; in the axes of date."""
     start = datetime(2026, *when, tzinfo=UTC)
     around = orbit(start=start).surroundings(0.0)
@@ -150,7 +150,7 @@ def test_the_sun_is_on_the_equator_at_an_equinox(when: Any, dec_deg: float) -> N
     assert np.degrees(np.arcsin(sun[2])) == pytest.approx(dec_deg, abs=0.02)
 
 
-def test_a_circular_orbit_stays_as_high_and_comes_back() -> None:
+def test_circular_orbit_keeps_its_altitude_and_repeats_after_its_period() -> None:
     own = orbit()
     heights = [own.surroundings(at).altitude_km for at in np.linspace(0, own.period_s, 50)]
     assert heights == pytest.approx([600] * 50, abs=20)  # the Earth is no ball
@@ -160,7 +160,7 @@ def test_a_circular_orbit_stays_as_high_and_comes_back() -> None:
     assert first.nadir @ again.nadir == pytest.approx(1.0, abs=1e-4)
 
 
-def test_the_shadow_lasts_as_long_as_geometry_says() -> None:
+def test_earth_shadow_lasts_as_geometry_predicts() -> None:
     """A cylinder behind the Earth: half the shadow's arc, for a Sun that is b from the orbit."""
     own = orbit()
     times = np.arange(0, own.period_s, 2.0)
@@ -178,7 +178,7 @@ def test_the_shadow_lasts_as_long_as_geometry_says() -> None:
 @pytest.mark.parametrize(
     ("apart", "share"), [(3.0, 0.0), (3.1, 0.0), (1.0, 1.0), (0.0, 1.0), (2.0, None)]
 )
-def test_hidden_fraction_of_a_disc(apart: float, share: float | None) -> None:
+def test_hidden_share_of_a_disc_matches_sampling(apart: float, share: float | None) -> None:
     rng = np.random.default_rng(0)
     points = rng.uniform(-1, 1, (200_000, 2))
     points = points[np.hypot(*points.T) < 1]
@@ -188,7 +188,7 @@ def test_hidden_fraction_of_a_disc(apart: float, share: float | None) -> None:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_a_rate_is_what_propagates_one_attitude_to_the_other(seed: int) -> None:
+def test_rate_between_two_attitudes_propagates_one_to_the_other(seed: int) -> None:
     rng = np.random.default_rng(seed)
     first, rate = rng.standard_normal(4), rng.uniform(-5, 5, 3)
     second = propagate(first, rate, 7.0)
@@ -197,7 +197,7 @@ def test_a_rate_is_what_propagates_one_attitude_to_the_other(seed: int) -> None:
     assert rate_between(np.eye(3), np.eye(3), 1.0) == pytest.approx(np.zeros(3))
 
 
-def test_nadir_pointing_points_there_and_turns_once_an_orbit() -> None:
+def test_nadir_pointing_faces_nadir_and_rotates_once_per_orbit() -> None:
     own = orbit(attitude=NadirPointing())
     body, rate = own.body(1000.0)
     around = own.surroundings(1000.0)
@@ -209,7 +209,7 @@ def test_nadir_pointing_points_there_and_turns_once_an_orbit() -> None:
     assert angle == pytest.approx(5.0)
 
 
-def test_waypoints_are_met_and_the_way_between_is_even() -> None:
+def test_waypoints_are_met_with_constant_rate_between() -> None:
     first, second = (tuple(quaternion_from_pointing(ra, 10, 0).tolist()) for ra in (20, 60))
     profile = Waypoints(((100.0, first), (200.0, second)))
     own = orbit(attitude=profile)
@@ -223,7 +223,7 @@ def test_waypoints_are_met_and_the_way_between_is_even() -> None:
 
 
 @pytest.mark.parametrize("at", [0.0, 0.5, 30.0, 2000.0])
-def test_a_sky_camera_sees_the_attitude_of_its_mounting(at: float) -> None:
+def test_sky_camera_sees_the_attitude_of_its_mounting(at: float) -> None:
     mounting = Mounting((0.0, -1.0, 0.0))
     own = orbit(mountings={"camera": mounting})
     scene = own.sky(at, SkyScene([0, 0, 0, 1], seed=5, epoch=2026.0), "camera")
@@ -235,7 +235,7 @@ def test_a_sky_camera_sees_the_attitude_of_its_mounting(at: float) -> None:
 
 
 @pytest.mark.parametrize("at", [0.0, 30.0, 2000.0])
-def test_the_satellites_cameras_see_earth_and_sun(at: float) -> None:
+def test_satellite_cameras_see_earth_and_sun(at: float) -> None:
     own = orbit(attitude=Inertial(rate_deg_s=(0.3, -0.2, 0.1)))
     scene = own.earth_sun_scene(at, EarthSunScene(seed=3))
     assert scene.seed == 3
@@ -254,7 +254,7 @@ def test_the_satellites_cameras_see_earth_and_sun(at: float) -> None:
     assert scene.hidden(scene.sun) == (own.surroundings(at).shadow > 0.5)
 
 
-def test_only_what_is_near_disturbs_the_sky() -> None:
+def test_orbit_adds_only_nearby_bodies_to_the_sky() -> None:
     own = orbit()
     seen = set()
     for direction in ((0, 0, 1), (0, 0, -1), (0, -1, 0), (1, 0, 0)):

@@ -19,20 +19,20 @@ def load(folder: Path, text: str):
     return load_orbit(save(folder, text))
 
 
-def test_the_least_that_there_must_be(tmp_path: Path) -> None:
+def test_minimal_orbit_file_loads_with_defaults(tmp_path: Path) -> None:
     orbit = load(tmp_path, START + CIRCLE)
     assert orbit.surroundings(0.0).altitude_km == pytest.approx(600, abs=20)
     assert isinstance(orbit.attitude, NadirPointing)
     assert (orbit.mountings, orbit.hazards) == ({}, True)
 
 
-def test_two_line_elements(tmp_path: Path) -> None:
+def test_orbit_file_loads_two_line_elements(tmp_path: Path) -> None:
     orbit = load(tmp_path, START + TLE)
     assert orbit.satellite.satnum == 5
     assert orbit.period_s == pytest.approx(86400 / 10.82419157, rel=1e-3)
 
 
-def test_each_attitude(tmp_path: Path) -> None:
+def test_orbit_file_accepts_each_attitude_kind(tmp_path: Path) -> None:
     text = START + CIRCLE
     found = load(tmp_path, text + '[attitude]\nkind = "nadir"\noffset_deg = [1, 2, 3]\n')
     assert found.attitude == NadirPointing((1.0, 2.0, 3.0))

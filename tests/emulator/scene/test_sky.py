@@ -23,7 +23,7 @@ def test_truth_follows_the_rate() -> None:
     assert attitude_error_deg(scene.truth(4 * 10**12), q) == pytest.approx((2.0, 0), abs=1e-9)
 
 
-def test_later_poses_hold_from_their_start_on() -> None:
+def test_each_pose_applies_from_its_start_time() -> None:
     first, second, third = (quaternion_from_pointing(ra, 0, 0) for ra in (0, 50, 100))
     poses = (Pose(second, at_s=1.0), Pose(third, (1.0, 0, 0), at_s=2.5))
     scene = SkyScene(first, poses=poses)
@@ -33,7 +33,7 @@ def test_later_poses_hold_from_their_start_on() -> None:
     assert scene.speed_deg_s == 1.0
 
 
-def test_turned() -> None:
+def test_rotated_scene_rotates_all_poses() -> None:
     q = quaternion_from_pointing(10, 20, 30)
     scene = SkyScene(q, mag_limit=3.0, poses=(Pose(q, at_s=1.0),)).rotate((0, 0, 5.0))
     for time_ps in (0, 2 * 10**12):
@@ -41,7 +41,7 @@ def test_turned() -> None:
     assert scene.mag_limit == 3.0
 
 
-def test_false_lights_are_those_of_the_seed() -> None:
+def test_false_stars_repeat_with_the_seed() -> None:
     sky = SkyScene([0, 0, 0, 1], false_stars=200, false_star_mag=(1.0, 2.0), seed=3)
     places, magnitudes = sky.false_lights()
     assert (places.shape, magnitudes.shape) == ((200, 2), (200,))
@@ -63,7 +63,7 @@ def test_rejects_a_quaternion_of_another_length() -> None:
     ("starts", "right"),
     [((), True), ((0.0,), True), ((1.0, 1.0, 2.0), True), ((2.0, 1.0), False), ((-0.1,), False)],
 )
-def test_poses_come_one_after_the_other(starts: tuple[float, ...], right: bool) -> None:
+def test_poses_must_have_rising_start_times(starts: tuple[float, ...], right: bool) -> None:
     q = quaternion_from_pointing(10, 20, 30)
     poses = tuple(Pose(q, at_s=start_s) for start_s in starts)
     if right:
@@ -79,7 +79,7 @@ def values() -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", ["a.png", "a.tif", "a.jpg"])
-def test_formats(tmp_path: Path, values: np.ndarray, name: str) -> None:
+def test_image_files_of_each_format_load(tmp_path: Path, values: np.ndarray, name: str) -> None:
     Image.fromarray(values).save(tmp_path / name, quality=100)
     pixels = load_picture(tmp_path / name)
     assert (pixels.shape, pixels.dtype) == (values.shape, np.uint8)
@@ -88,14 +88,14 @@ def test_formats(tmp_path: Path, values: np.ndarray, name: str) -> None:
     np.testing.assert_allclose(pixels.astype(int), values, atol=8)
 
 
-def test_crop_is_column_and_row(tmp_path: Path, values: np.ndarray) -> None:
+def test_crop_offset_is_column_then_row(tmp_path: Path, values: np.ndarray) -> None:
     Image.fromarray(values).save(tmp_path / "a.png")
     part = PictureScene(tmp_path / "a.png", crop=(76, 88)).part(1000, 500)
     np.testing.assert_array_equal(part, values[88:588, 76:1076])
     assert part.flags.c_contiguous
 
 
-def test_sixteen_bits_give_their_upper_eight_and_colours_their_luma(tmp_path: Path) -> None:
+def test_image_loading_keeps_upper_8_of_16_bits_and_luma_of_colours(tmp_path: Path) -> None:
     wide = np.random.default_rng(2).integers(0, 1 << 16, (512, 1024), np.uint16)
     Image.fromarray(wide).save(tmp_path / "a.png")
     np.testing.assert_array_equal(load_picture(tmp_path / "a.png"), wide >> 8)
@@ -113,7 +113,7 @@ def test_rejects_crops_outside_the_image(tmp_path: Path) -> None:
         PictureScene(tmp_path / "small.png", crop=(-1, 0))
 
 
-def test_wrong_formats(tmp_path: Path) -> None:
+def test_unsupported_image_formats_are_rejected(tmp_path: Path) -> None:
     Image.new("L", (1024, 512)).save(tmp_path / "a.bmp")
     (tmp_path / "text.png").write_text("hello")
     Image.new("F", (1024, 512)).save(tmp_path / "float.tif")
@@ -126,7 +126,7 @@ def test_wrong_formats(tmp_path: Path) -> None:
             load_picture(tmp_path / name)
 
 
-def test_damaged_pictures(tmp_path: Path, values: np.ndarray) -> None:
+def test_damaged_image_file_raises_scene_error(tmp_path: Path, values: np.ndarray) -> None:
     Image.new("L", (1024, 512), 7).save(tmp_path / "a.jpg")
     os.truncate(tmp_path / "a.jpg", (tmp_path / "a.jpg").stat().st_size // 2)
     with pytest.raises(SceneError, match=r"a\.jpg can not be read"):

@@ -54,7 +54,7 @@ def test_program_breakpoint_stops_once(debugger: Debugger) -> None:
     assert run_on(debugger) == (CODE + 8, 6, False)
 
 
-def test_a_step_at_a_breakpoint_of_the_program_is_that_behind_it(debugger: Debugger) -> None:
+def test_step_at_a_breakpoint_instruction_executes_the_next_one(debugger: Debugger) -> None:
     debugger.set_register("pc", CODE)
     run_on(debugger)
     debugger.step(0, 0)

@@ -42,13 +42,13 @@ def tripped(kernel, power) -> list[tuple[int, str]]:
 
 
 @pytest.mark.parametrize("mode", MODES)
-def test_published_currents(power, mode):
+def test_power_modes_draw_the_published_currents(power, mode):
     current_ma, _, states = MODES[mode]
     enter(power, states)
     assert power.current_ma() == pytest.approx(current_ma, abs=0.005)
 
 
-def test_charge_of_a_published_iteration(kernel, power):
+def test_iteration_charge_matches_the_published_value(kernel, power):
     """Equation 6.3.1: 396.2 mW over one second at 3.3 V."""
     for _, duration_ms, states in MODES.values():
         enter(power, states)
@@ -57,7 +57,7 @@ def test_charge_of_a_published_iteration(kernel, power):
     assert power.charge_mas() * 3.3 == pytest.approx(396.2, abs=0.1)
 
 
-def test_charge_is_that_of_the_time_before_a_channel_was_switched(kernel, power):
+def test_charge_integrates_the_current_before_and_after_switching(kernel, power):
     before = power.current_ma()
     kernel.advance_to(1000 * PS_PER_MS)
     power.switch("memory", False)
@@ -67,7 +67,7 @@ def test_charge_is_that_of_the_time_before_a_channel_was_switched(kernel, power)
     assert power.charge_mas() == pytest.approx(before + 2 * after)
 
 
-def test_channels_and_unswitched_parts_add_up(power):
+def test_total_current_is_the_sum_of_channels_and_unswitched_parts(power):
     enter(power, MODES[3][2])
     always_on = PARTS["leds"].ma["on"] + PARTS["processor"].ma["run"]
     channels = sum(power.current_ma(channel) for channel in CHANNELS)
@@ -81,7 +81,7 @@ def test_no_regular_state_trips_a_comparator(power):
         assert highest < limit
 
 
-def test_channel_that_is_off_draws_nothing(power):
+def test_switched_off_channel_draws_no_current(power):
     before = power.current_ma()
     imager = power.current_ma("imager")
     power.switch("imager", False)
@@ -92,7 +92,7 @@ def test_channel_that_is_off_draws_nothing(power):
     assert power.current_ma("imager") == pytest.approx(imager + 50)
 
 
-def test_switch_tells_changes_only(power):
+def test_power_switch_reports_changes_only(power):
     told = []
     power.on_switch = lambda *change: told.append(change)
     power.switch("memory", True)
@@ -139,7 +139,7 @@ def test_current_shorter_than_the_comparator_delay_is_not_reported(kernel, power
     assert tripped == []
 
 
-def test_small_latch_up_goes_unnoticed_but_costs_charge(kernel, power, tripped):
+def test_small_latch_up_is_not_detected_but_draws_charge(kernel, power, tripped):
     power.latch_up("memory", 20.0)
     kernel.advance_to(1000 * PS_PER_MS)
     assert tripped == []
@@ -200,7 +200,9 @@ CUBESENSE_STATES = [
 @pytest.mark.parametrize(
     ("published_mw", "processor", "memories", "cameras", "sides"), CUBESENSE_STATES
 )
-def test_published_power_of_cubesense(kernel, published_mw, processor, memories, cameras, sides):
+def test_cubesense_states_draw_the_published_power(
+    kernel, published_mw, processor, memories, cameras, sides
+):
     power = PowerModel(kernel, CUBESENSE_POWER)
     power.set_state("processor", processor)
     for half, (memory, side) in enumerate((("1", "sun"), ("2", "nadir"))):

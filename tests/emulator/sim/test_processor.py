@@ -84,7 +84,7 @@ CASES = {
 
 
 @pytest.mark.parametrize(("steps", "events", "log"), CASES.values(), ids=CASES)
-def test_when_requests_are_answered(desk_of, steps, events, log):
+def test_processor_answers_each_request_at_its_time(desk_of, steps, events, log):
     desk = desk_of(script(*steps))
     desk.ack_at(*events.get("ack", ()))
     for us, cycles in events.get("work", {}).items():
@@ -102,7 +102,7 @@ def test_main_starts_after_the_boot_time(desk_of):
     assert desk.causes == [POWER_ON]
 
 
-def test_pin_is_driven_when_the_work_before_it_is_done(desk_of):
+def test_pin_changes_after_the_preceding_work(desk_of):
     desk = desk_of(script(10, req.SetPin("ENABLE", 1), req.SetPin("RNW", 1))).run()
     rises = [((time // PS_PER_US) - BOOT_US, pin, level) for time, pin, level in desk.engine.pins]
     assert rises == [(10, "ENABLE", 1), (10 + PORT_WRITE, "RNW", 1)]
@@ -110,7 +110,7 @@ def test_pin_is_driven_when_the_work_before_it_is_done(desk_of):
     assert desk.log[0] == (10, None)
 
 
-def test_pin_that_does_not_lead_to_the_fpga(desk_of):
+def test_pins_outside_the_fpga_reach_the_board_only(desk_of):
     steps = (req.SetPin("LINE", 1), req.ReadPin("LINE"), req.SetPin("LINE", 0), req.ReadPin("LINE"))
     desk = desk_of(script(*steps)).run()
     first, second = PORT_WRITE, PORT_WRITE + PORT_READ
@@ -130,7 +130,7 @@ def test_other_events_do_not_move_the_poll(desk_of, other_us):
     assert happened == [other_us]
 
 
-def test_event_can_remove_the_level_before_the_poll(desk_of):
+def test_level_removed_before_the_poll_is_not_seen(desk_of):
     """A supply that is cut when ACK rises: the program sees no ACK before the next one."""
     desk = desk_of(script(awaiting()))
     desk.ack_at(100)
@@ -138,7 +138,7 @@ def test_event_can_remove_the_level_before_the_poll(desk_of):
     assert desk.run().log == [(203, True)]
 
 
-def test_engine_never_runs_past_an_event_and_looks_ahead_so_far_only(desk_of):
+def test_engine_stops_at_events_and_looks_ahead_a_limited_time(desk_of):
     """A host that writes in between is late for the FPGA by no more than that."""
     desk = desk_of(script(awaiting(timeout_us=200_000)))
     events = [10, 777, 778, 4999]
@@ -165,7 +165,7 @@ def test_camera_transfer_takes_the_time_of_the_bus_and_the_engine_follows(desk_o
     assert performed == [(request, *[(BOOT_US + 155) * PS_PER_US] * 2)]
 
 
-def test_reset_closes_the_program_forgets_a_wake_and_starts_anew_with_its_cause(desk_of):
+def test_reset_restarts_the_program_with_its_cause_and_forgets_wakes(desk_of):
     closed = []
 
     def first(desk):
@@ -229,7 +229,7 @@ def test_a_board_without_an_fpga_refuses_what_needs_one(desk_of, request_):
     assert desk.pins_told == [("LINE", 1)]
 
 
-def test_program_that_returns(desk_of):
+def test_program_that_returns_without_reset_raises_runtime_error(desk_of):
     desk = desk_of()
     desk.processor.program.main = lambda: (request for request in [PAY])
     with pytest.raises(RuntimeError, match="must end in Reset"):
@@ -242,14 +242,14 @@ def test_reports_wake_at_the_deadline_once(desk_of):
     assert sorted(answer for _, answer in desk.run().log) == [False, True]
 
 
-def test_reports_activity(desk_of):
+def test_processor_reports_its_activity(desk_of):
     desk = desk_of(script(sleep(500), sleep(900))).run()
     assert desk.activity == [
         (-BOOT_US, True), (0, False), (500, True), (500, False), (900, True), (900, False)
     ]  # fmt: skip
 
 
-def test_dozing_is_to_sleep_until_an_interrupt_and_waiting_without_a_deadline(desk_of):
+def test_processor_dozes_until_an_interrupt_and_waits_without_a_deadline(desk_of):
     desk = desk_of(script(sleep(500, wakeable=False), sleep(900), req.Sleep(None)))
     for us, waiting, dozing in ((499, False, False), (899, False, True), (1999, True, True)):
         processor = desk.run(us).processor
@@ -291,7 +291,7 @@ def transfer(count: int, work: int = 0):
         (50, range(0, 120 * exact_ps(CYCLES // 2), exact_ps(CYCLES // 2))),
     ],
 )
-def test_transfer_takes_its_cycles_whatever_happens_in_between(desk_of, count, events_ps):
+def test_transfer_time_does_not_depend_on_other_events(desk_of, count, events_ps):
     desk = desk_of(transfer(count), hz=HZ)
     for time_ps in events_ps:
         desk.kernel.timeout(BOOT_US * PS_PER_US + time_ps)
@@ -300,7 +300,7 @@ def test_transfer_takes_its_cycles_whatever_happens_in_between(desk_of, count, e
 
 
 @pytest.mark.parametrize(("work", "interrupts_us"), [(481, []), (0, [10, 11, 300])])
-def test_cycles_of_others_are_paid_before_and_within_a_transfer(desk_of, work, interrupts_us):
+def test_charged_and_interrupt_cycles_extend_a_transfer(desk_of, work, interrupts_us):
     """Where an interrupt breaks the loop, a fraction of a picosecond is lost."""
     desk = desk_of(transfer(1000, work), hz=HZ)
     for us in interrupts_us:

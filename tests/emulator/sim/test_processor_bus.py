@@ -51,7 +51,7 @@ def read(count: int = PIXELS, above: int = 255) -> tuple[BusAccess, np.ndarray]:
 
 
 @pytest.mark.parametrize("tick_ns", [None, 7, 130, 1001])
-def test_accesses_take_their_cycles_whoever_interrupts(tick_ns: int | None) -> None:
+def test_bus_accesses_take_their_cycles_despite_timer_interrupts(tick_ns: int | None) -> None:
     times: list[int] = []
     request, data = read()
 
@@ -66,14 +66,14 @@ def test_accesses_take_their_cycles_whoever_interrupts(tick_ns: int | None) -> N
     assert not desk.engine.violation_counts
 
 
-def test_a_search_stops_where_the_byte_is() -> None:
+def test_bus_search_stops_at_the_first_byte_above_the_limit() -> None:
     request, data = read(above=109)
     assert desk_with(request, tick_ns=130).run(1000).log[-1][1] == 11
     assert data[10] == 110
     assert not data[11:].any()
 
 
-def test_writes_are_in_memory() -> None:
+def test_bus_writes_reach_the_memory() -> None:
     values = np.arange(PIXELS, dtype=np.uint8)[::-1].copy()
     desk = desk_with(BusAccess(SECOND.copy(), values, True, CYCLES, 0, 255), tick_ns=333).run(1000)
     assert np.array_equal(desk.engine.memories["SRAM2"], values)
@@ -84,7 +84,7 @@ def load(desk: Desk, address: int, count: int) -> bytes:
     return desk.processor.load(0, address, count, CYCLES)
 
 
-def test_an_interrupt_reads_in_between_and_pays_for_it() -> None:
+def test_interrupt_reads_between_bus_accesses_and_is_charged() -> None:
     loaded: list[bytes] = []
     ended: list[int] = []
     request, data = read()
@@ -101,7 +101,7 @@ def test_an_interrupt_reads_in_between_and_pays_for_it() -> None:
     assert plain.engine.get_pin("RNW") == disturbed.engine.get_pin("RNW") == 0
 
 
-def test_an_interrupt_reads_while_the_program_waits_for_the_fpga() -> None:
+def test_interrupt_can_read_while_the_program_waits_for_the_fpga() -> None:
     """The FPGA is ahead of the kernel then, and neither runs back."""
     loaded: set[bytes] = set()
     desk = desk_with(SetPin("INTO", 0), SetPin("RNW", 0), AwaitPin("ACK", 1, 100, 8), tick_ns=50)
@@ -131,7 +131,7 @@ def made(count: int = 3, **changes: Any) -> Transactions:
     return Transactions(**given | changes)
 
 
-def test_events_are_the_sums_of_the_phases() -> None:
+def test_bus_event_times_are_sums_of_the_phase_durations() -> None:
     timing = BusTiming(2, 3, 1, 7, 2)
     one = made(timing=timing, cycles=40)
     # Latch opens, closes; select; strobe falls, rises; release.
@@ -146,7 +146,7 @@ def test_events_are_the_sums_of_the_phases() -> None:
     assert one.period == 40 * CYCLE
 
 
-def test_the_first_of_them_are_the_same_memory() -> None:
+def test_first_transactions_share_the_memory_of_the_whole() -> None:
     whole = made(5)
     some = whole.first(2)
     assert (len(whole), len(some)) == (5, 2)
@@ -166,7 +166,7 @@ def test_the_first_of_them_are_the_same_memory() -> None:
         ({"cycles": EBI.cycles - 1}, f"takes {EBI.cycles} cycles, not {EBI.cycles - 1}"),
     ],
 )
-def test_rejects_impossible_arguments(changes: dict[str, Any], words: str) -> None:
+def test_transactions_reject_inconsistent_arguments(changes: dict[str, Any], words: str) -> None:
     with pytest.raises(ValueError, match=words):
         made(**changes)
     assert made(cycles=EBI.cycles).cycles == EBI.cycles
@@ -209,7 +209,7 @@ class Pins:
     def stop(self) -> None: ...
 
 
-def test_banks_lead_to_the_chip_selects_that_they_are_wired_to() -> None:
+def test_banks_select_the_wired_chip_selects() -> None:
     fpga, machine = Memory(), Pins()
     coupling = FpgaCoupling(machine, fpga, (), banks=(2, 0))  # type: ignore[arg-type]
     machine.access(2, 0x100, 17, 1000)

@@ -13,13 +13,13 @@ CYCLES = st.lists(st.integers(0, 10**9), max_size=20)
 
 
 @given(HZ, CYCLES)
-def test_any_split_takes_as_long_as_one_stretch(hz, pieces):
+def test_split_cycle_counts_elapse_like_their_sum(hz, pieces):
     split, whole = CycleClock(hz), CycleClock(hz)
     assert sum(split.elapse(cycles) for cycles in pieces) == whole.elapse(sum(pieces))
 
 
 @given(HZ, CYCLES)
-def test_elapsed_time_is_the_true_one_less_a_fraction_of_a_picosecond(hz, pieces):
+def test_cycle_clock_lags_true_time_by_less_than_1_ps(hz, pieces):
     clock, elapsed, cycles = CycleClock(hz), 0, 0
     for piece in pieces:
         elapsed += clock.elapse(piece)
@@ -27,7 +27,7 @@ def test_elapsed_time_is_the_true_one_less_a_fraction_of_a_picosecond(hz, pieces
         assert 0 <= Fraction(cycles * PS_PER_S, hz) - elapsed < 1
 
 
-def test_remainder_is_paid_later():
+def test_cycle_clock_carries_the_remainder():
     clock = CycleClock(3)
     third = PS_PER_S // 3
     assert [clock.elapse(1) for _ in range(3)] == [third, third, third + 1]
@@ -50,14 +50,14 @@ def test_horizon_is_the_next_event():
     assert kernel.horizon() == 7
 
 
-def test_time_is_an_exact_integer():
+def test_kernel_time_is_an_exact_integer():
     kernel = Kernel()
     kernel.advance_to(10**18 + 1)  # a float would lose the one
     assert kernel.now == 10**18 + 1
     assert type(kernel.now) is int
 
 
-def test_advance_performs_what_lies_before():
+def test_advance_processes_events_before_its_target_time():
     kernel = Kernel()
     happened = []
     for time in (10, 20, 30):
@@ -73,7 +73,7 @@ def test_advance_performs_what_lies_before():
     assert kernel.horizon() == 47
 
 
-def test_horizon_is_no_later_than_where_time_is_advanced_to():
+def test_horizon_is_no_later_than_the_target_time():
     """Look-ahead stops there, because an outside event may follow."""
     kernel = Kernel()
     seen = []

@@ -43,7 +43,7 @@ def desk() -> Desk:
     return Desk()
 
 
-def test_set_up_writes_what_the_settings_say_once(desk: Desk) -> None:
+def test_camera_set_up_writes_changed_settings_once(desk: Desk) -> None:
     desk.state.settings.put("SetExposure", {"Rows": 2000})
     desk.state.settings.put("SetGain", {"Gain": 4.0})
     assert desk.start() is None
@@ -61,7 +61,7 @@ def test_set_up_writes_what_the_settings_say_once(desk: Desk) -> None:
     assert registers[0x35] == 0x60
 
 
-def test_a_silent_or_a_strange_camera(desk: Desk) -> None:
+def test_silent_or_unknown_camera_raises_camera_silent(desk: Desk) -> None:
     registers, desk.unit.registers = desk.unit.registers, None
     assert desk.start() is Reason.CAMERA_SILENT
     desk.unit.registers = registers
@@ -70,7 +70,7 @@ def test_a_silent_or_a_strange_camera(desk: Desk) -> None:
     assert desk.state.flags == {"CameraSilent"}
 
 
-def test_a_camera_that_tells_its_version_and_takes_no_value_is_silent(desk: Desk) -> None:
+def test_camera_that_refuses_writes_is_reported_silent(desk: Desk) -> None:
     def read_only(request: CameraTransfer) -> bytes | None:
         return transfer(request) if len(request.data) == 1 else None
 
@@ -84,7 +84,7 @@ def test_a_camera_that_tells_its_version_and_takes_no_value_is_silent(desk: Desk
     assert desk.unit.registers[0x09] == 2000  # what was not taken then is written now
 
 
-def test_pictures_alternate_between_two_places(desk: Desk) -> None:
+def test_captures_alternate_between_two_buffers(desk: Desk) -> None:
     desk.start()
     for number in range(1, 5):
         assert desk.take() is None
@@ -96,13 +96,13 @@ def test_pictures_alternate_between_two_places(desk: Desk) -> None:
 
 
 @pytest.mark.parametrize(("place", "start"), [(0, 0), (1, 0x20_0000)])
-def test_pictures_begin_at_whole_rows_of_the_sdram(desk: Desk, place: int, start: int) -> None:
+def test_images_begin_at_whole_rows_of_the_sdram(desk: Desk, place: int, start: int) -> None:
     """The first one at its very beginning; a row of the MT48LC16M16 has 512 words of 16 bits."""
     desk.camera.picture(place)[0, :3] = 1, 2, 3
     assert np.flatnonzero(desk.unit.sdram).tolist() == [start, start + 1, start + 2]
 
 
-def test_the_image_s_time_is_that_of_the_middle_row(desk: Desk) -> None:
+def test_image_time_is_mid_exposure_of_the_middle_row(desk: Desk) -> None:
     desk.state.settings.put("SetExposure", {"Rows": 3000})
     desk.start()
     desk.take()
@@ -110,7 +110,7 @@ def test_the_image_s_time_is_that_of_the_middle_row(desk: Desk) -> None:
     assert desk.unit.now_us - desk.camera.image_us() == pytest.approx(age_us, abs=2)
 
 
-def test_no_frame_within_three_of_them_is_a_timeout(desk: Desk) -> None:
+def test_camera_times_out_after_three_frame_times(desk: Desk) -> None:
     desk.start()
     desk.frame_us = None
     before = desk.unit.now_us
@@ -122,7 +122,7 @@ def test_no_frame_within_three_of_them_is_a_timeout(desk: Desk) -> None:
 
 
 @pytest.mark.parametrize("end", [FrameEnd.TOO_SHORT, FrameEnd.WRONG_LINES])
-def test_a_frame_that_is_not_as_programmed(desk: Desk, end: FrameEnd) -> None:
+def test_frame_of_unexpected_size_raises_camera_frame_error(desk: Desk, end: FrameEnd) -> None:
     desk.start()
     desk.end = end
     assert (desk.take(), desk.state.flags) == (Reason.CAMERA_FRAME, {"CameraFrameError"})
@@ -144,7 +144,7 @@ def test_waits_for_frame_requested_before(desk: Desk) -> None:
     assert len(desk.unit.captures) == 3
 
 
-def test_cutting_the_supply_ends_the_wait(desk: Desk) -> None:
+def test_cutting_the_camera_supply_ends_the_frame_wait(desk: Desk) -> None:
     desk.start()
     desk.unit.on_sleep = desk.camera.cut
     stopped = desk.unit.stopped
@@ -161,7 +161,7 @@ def test_cutting_the_supply_ends_the_wait(desk: Desk) -> None:
     assert (desk.start(), desk.take()) == (None, None)
 
 
-def test_registers_by_address(desk: Desk) -> None:
+def test_camera_register_is_written_and_selected_by_address(desk: Desk) -> None:
     assert desk.unit.perform(desk.camera.write(0x35, 0x21))
     desk.unit.perform(desk.camera.select(0x35))
     assert desk.camera.selected_register == (0x35, 0x21)
@@ -176,7 +176,7 @@ FIELDS = pytest.mark.parametrize("field", [CameraField(), CameraField(fov_deg=18
 
 
 @FIELDS
-def test_directions_project_back(field: CameraField) -> None:
+def test_camera_field_directions_project_back_to_the_pixels(field: CameraField) -> None:
     rng = np.random.default_rng(1)
     points = rng.uniform(0, 1, (500, 2)) * (field.columns - 1, field.rows - 1)
     directions = field.directions(points.astype(np.float32), meter())
@@ -184,7 +184,7 @@ def test_directions_project_back(field: CameraField) -> None:
     np.testing.assert_allclose(project(directions.astype(np.float64), field), points, atol=2e-3)
 
 
-def test_the_shorter_side_spans_the_field() -> None:
+def test_shorter_image_side_spans_the_field_of_view() -> None:
     field = CameraField()
     edge = np.array([[639.5, -0.5], [639.5, 1023.5]], dtype=np.float32)
     top, bottom = field.directions(edge, meter()).astype(np.float64)
@@ -193,7 +193,7 @@ def test_the_shorter_side_spans_the_field() -> None:
 
 
 @FIELDS
-def test_three_ways_to_ask_what_is_in_the_field(field: CameraField) -> None:
+def test_inside_contains_and_mask_agree_on_the_field(field: CameraField) -> None:
     rng = np.random.default_rng(2)
     points = rng.uniform(-0.2, 1.2, (2000, 2)) * (field.columns, field.rows)
     points = points[np.abs(np.hypot(*(points - field.centre).T) - 512) > 0.1]
@@ -205,7 +205,7 @@ def test_three_ways_to_ask_what_is_in_the_field(field: CameraField) -> None:
 
 
 @FIELDS
-def test_the_mask_is_the_field(field: CameraField) -> None:
+def test_field_mask_contains_exactly_the_pixels_inside(field: CameraField) -> None:
     y, x = np.nonzero(field.mask)
     points = np.stack([x, y], axis=1).astype(np.float32)
     assert field.inside(points, meter()).all()
@@ -213,7 +213,7 @@ def test_the_mask_is_the_field(field: CameraField) -> None:
     assert not field.mask.flags.writeable
 
 
-def test_solid_angles() -> None:
+def test_camera_field_solid_angle_matches_integration() -> None:
     x, y = np.array([OBLONG.columns, OBLONG.rows]) / 2 * OBLONG.scale
     exact = integrate.dblquad(lambda y, x: (1 + x * x + y * y) ** -1.5, -x, x, -y, y)[0]
     assert OBLONG.solid_angle_sr == pytest.approx(exact, rel=0.06)

@@ -51,7 +51,7 @@ def numbers(found: Solution) -> list[float]:
 
 
 @pytest.mark.parametrize("name", PICTURES)
-def test_pictures(name: str) -> None:
+def test_image_processing_charges_the_recorded_operations(name: str) -> None:
     spent = meter()
     configuration: Configuration = PICTURES[name]
     found = solve_picture(sky(9)[1], LevelHistory(), configuration, database(), spent)
@@ -61,7 +61,9 @@ def test_pictures(name: str) -> None:
 @pytest.mark.parametrize("profile", PROFILES)
 @pytest.mark.parametrize("light", LISTS)
 @pytest.mark.parametrize("hint_deg", [None, 2.0])
-def test_lists(light: str, profile: str, hint_deg: float | None) -> None:
+def test_matching_of_star_lists_charges_the_recorded_operations(
+    light: str, profile: str, hint_deg: float | None
+) -> None:
     rng, spent = np.random.default_rng(5), meter()
     made = picture(rng, FIELD, LISTS[light])
     hint = None if hint_deg is None else made.hint(hint_deg, rng)
@@ -70,7 +72,7 @@ def test_lists(light: str, profile: str, hint_deg: float | None) -> None:
 
 
 @pytest.mark.parametrize("round_", [False, True])
-def test_a_field(round_: bool) -> None:
+def test_camera_field_charges_the_recorded_operations(round_: bool) -> None:
     spent, field = meter(), CameraField(round=round_)
     points = np.linspace((0, 0), (1279, 1023), 40, dtype=np.float32)
     directions = field.directions(points, spent)
@@ -78,7 +80,7 @@ def test_a_field(round_: bool) -> None:
     as_on_record(f"AraMiS field: round {round_}", spent, [int(each.sum()) for each in inside])
 
 
-def test_a_moving_shutter() -> None:
+def test_rolling_shutter_correction_charges_the_recorded_operations() -> None:
     rng, spent = np.random.default_rng(6), meter()
     made: Any = picture(rng, FIELD)
     vectors = FIELD.directions(made.stars.centroids, meter())
@@ -87,7 +89,7 @@ def test_a_moving_shutter() -> None:
     as_on_record("AraMiS shutter", spent)
 
 
-def test_flash_with_errors() -> None:
+def test_flash_decoding_charges_the_recorded_operations() -> None:
     spent, coded = meter(), encode(bytes(range(80)))
     coded[[0, 20, 40]] ^= 1
     coded[[60, 61]] ^= 1

@@ -57,7 +57,7 @@ def distances_px(found: StarList, made: Picture) -> NDArray[np.float32]:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_picture_gives_the_attitude(seed: int) -> None:
+def test_attitude_from_an_image_is_within_0_01_deg(seed: int) -> None:
     made, image = sky(seed)
     solution = solve(image)
     assert solution.outcome is MeasurementOutcome.CONCLUSIVE
@@ -66,7 +66,7 @@ def test_a_picture_gives_the_attitude(seed: int) -> None:
     assert roll < 0.05
 
 
-def test_stars_are_found_where_they_are() -> None:
+def test_stars_are_found_at_their_true_positions() -> None:
     made, image = sky(5)
     found = find(image)
     assert len(found) > 6
@@ -74,7 +74,7 @@ def test_stars_are_found_where_they_are() -> None:
     assert (np.diff(found.brightness) <= 0).all()
 
 
-def test_subtracting_the_background_makes_centroids_better() -> None:
+def test_background_subtraction_improves_centroids() -> None:
     skies = [sky(seed) for seed in range(3)]
     plain, better = (
         [distances_px(find(image, subtract=subtract), made) for made, image in skies]
@@ -83,34 +83,34 @@ def test_subtracting_the_background_makes_centroids_better() -> None:
     assert np.median(np.concatenate(better)) < np.median(np.concatenate(plain))
 
 
-def test_the_published_method_finds_fewer_stars() -> None:
+def test_published_spike_method_finds_fewer_stars() -> None:
     _, image = sky(6)
     methods = SpikeRemoval.WINDOW, SpikeRemoval.CENTRE
     published, other = (len(find(image, spikes=method, max_stars=255)) for method in methods)
     assert 3 <= published < other
 
 
-def test_what_lies_outside_the_field_is_not_seen() -> None:
+def test_detection_ignores_light_outside_the_field() -> None:
     image = np.full((FIELD.rows, FIELD.columns), 10, dtype=np.uint8)
     image[500:510, 20:30] = image[500:510, 640:650] = 200
     found = detect(image, LevelHistory(), FIELD, PUBLISHED.detection, meter())
     np.testing.assert_allclose(found.centroids, [[644.5, 504.5]], atol=0.01)
 
 
-def test_only_the_brightest_are_kept() -> None:
+def test_only_the_brightest_stars_are_kept() -> None:
     assert len(find(sky(7)[1], max_stars=5)) == 5
 
 
 @pytest.mark.parametrize("configuration", [PUBLISHED, VERIFIED])
 @pytest.mark.parametrize("level", [0, 14, 255])
-def test_an_empty_picture(configuration: Configuration, level: int) -> None:
+def test_uniform_image_ends_without_an_attitude(configuration: Configuration, level: int) -> None:
     image = np.full((FIELD.rows, FIELD.columns), level, dtype=np.uint8)
     full = level == 255 and configuration is VERIFIED
     reason = Reason.SATURATED if full else Reason.TOO_FEW_STARS
     assert end_of(solve(image, configuration)) == (MeasurementOutcome.NONE, reason)
 
 
-def test_a_picture_of_nothing_but_edges_is_given_up() -> None:
+def test_image_of_only_edges_ends_with_too_many_pixels() -> None:
     image = np.zeros((FIELD.rows, FIELD.columns), dtype=np.uint8)
     image[:, ::8] = 255
     image[::2] = 0
@@ -119,7 +119,7 @@ def test_a_picture_of_nothing_but_edges_is_given_up() -> None:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_random_stars_give_no_attitude(seed: int) -> None:
+def test_random_image_yields_no_attitude(seed: int) -> None:
     image = np.random.default_rng(seed).integers(0, 256, (FIELD.rows, FIELD.columns))
     assert solve(image.astype(np.uint8)).outcome is MeasurementOutcome.NONE
 
@@ -130,7 +130,7 @@ def test_rejects_image_of_another_size() -> None:
         solve(np.zeros((10, 10), np.uint8))
 
 
-def test_phases_and_time_of_a_picture_that_is_not_changed() -> None:
+def test_solving_reports_phases_and_leaves_the_image_unchanged() -> None:
     (_, image), spent = sky(9), meter()
     image.flags.writeable = False
     solve(image, VERIFIED, spent)
@@ -172,15 +172,15 @@ def hit(count: int) -> NDArray[np.uint8]:
     ],
     ids=["dark", "bright", "gradient", "limb", "disc", "hits"],
 )
-def test_the_reason_is_true(image: NDArray[np.uint8], expected: Reason) -> None:
+def test_failure_reason_matches_the_image(image: NDArray[np.uint8], expected: Reason) -> None:
     assert reason(image) is expected
 
 
-def test_a_picture_full_of_hits_is_not_even_tried() -> None:
+def test_image_full_of_radiation_hits_is_not_matched() -> None:
     spent = meter()
     assert solve(hit(60_000), spent=spent).reason is Reason.RADIATION
     assert "triangles" not in spent.phases
 
 
-def test_as_published_there_are_no_such_reasons() -> None:
+def test_published_profile_does_not_report_radiation() -> None:
     assert reason(hit(2000), PUBLISHED) is Reason.TOO_FEW_STARS

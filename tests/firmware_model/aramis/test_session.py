@@ -103,14 +103,14 @@ class Unit(Harness):
 
 
 @pytest.mark.parametrize("profile", ["published", "extended"])
-def test_session(profile: str) -> None:
+def test_aramis_session_matches_its_recording(profile: str) -> None:
     unit = Unit(AramisSwitches.of(profile))
     as_recorded(unit, f"AraMiS session, {profile}", STEPS)
     as_recorded(unit, f"AraMiS session, {profile}, later", LATER)
 
 
 @pytest.mark.parametrize("profile", ["published", "extended"])
-def test_loop(profile: str) -> None:
+def test_aramis_loop_matches_its_recording(profile: str) -> None:
     unit = Unit(AramisSwitches.of(profile))
     unit.command("SetReloadPeriod", Period=2)
     unit.command("Activate")
@@ -123,7 +123,7 @@ NEED_IT = "GetAttitude", "GetAttitudeNearPoint", "StartLoop", "ReloadCatalogue",
 
 
 @pytest.mark.parametrize("name", NEED_IT)
-def test_what_needs_an_active_sensor_says_so(name: str) -> None:
+def test_telecommands_that_need_activation_raise_not_active(name: str) -> None:
     unit = Unit(AramisSwitches.of("extended"))
     before = unit.telemetry("CatalogueStatus"), unit.telemetry("LoopStatus")
     unit.command(name)
@@ -134,7 +134,7 @@ def test_what_needs_an_active_sensor_says_so(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["WriteCameraRegister", "SelectCameraRegister"])
-def test_a_register_of_a_camera_that_does_not_answer(name: str) -> None:
+def test_register_access_of_a_silent_camera_raises_camera_silent(name: str) -> None:
     unit = Harness()
     program = AramisProgram(unit, unit.meter)
     command = QueuedCommand(INTERFACE.telecommand(name), {"Address": 9, "Value": 5})

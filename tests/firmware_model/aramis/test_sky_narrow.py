@@ -43,7 +43,7 @@ def solved(path: Path, configuration: Configuration, aided: bool) -> tuple[Solut
 
 @pytest.mark.parametrize("path", PICTURES, ids=lambda path: str(path.stem))
 @pytest.mark.parametrize("aided", [False, True])
-def test_each_is_solved(path: Path, aided: bool) -> None:
+def test_narrow_sky_images_are_solved(path: Path, aided: bool) -> None:
     solution, truth = solved(path, VERIFIED, aided)
     assert solution.outcome is MeasurementOutcome.CONCLUSIVE
     cross, roll = errors_deg(solution.quaternion, truth)
@@ -52,7 +52,7 @@ def test_each_is_solved(path: Path, aided: bool) -> None:
 
 
 @pytest.mark.parametrize("aided", [False, True])
-def test_most_are_solved_as_published(aided: bool) -> None:
+def test_published_profile_solves_most_sample_images(aided: bool) -> None:
     """Lost in space, one unique triangle of six is a wrong one: what verification is for."""
     pairs = [solved(path, PUBLISHED, aided) for path in PICTURES]
     found = [(one.quaternion, truth) for one, truth in pairs if one.quaternion is not None]

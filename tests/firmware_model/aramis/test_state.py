@@ -25,7 +25,7 @@ from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.memory import FlashStore
 
 
-def test_the_clock_counts_on_over_noon() -> None:
+def test_julian_clock_continues_over_noon() -> None:
     clock = Clock()
     assert clock.at(123_000) == (0, 0)
     assert not clock.is_set
@@ -38,7 +38,7 @@ def test_the_clock_counts_on_over_noon() -> None:
     assert clock.at(1_000_000) == (0, 0)  # a time before the epoch is the epoch
 
 
-def test_a_fresh_state() -> None:
+def test_new_state_is_inactive_and_without_a_measurement() -> None:
     state = State(FlashStore())
     assert not state.active
     assert not state.measurement.valid
@@ -64,7 +64,7 @@ def test_damaged_settings_raise_their_flag() -> None:
 TURN = {"Q0": 0.0, "Q1": 0.0, "Q2": 1.0, "Q3": 0.0}
 
 
-def test_saved_settings_come_back_and_others_do_not() -> None:
+def test_only_saved_settings_are_restored() -> None:
     flash = FlashStore()
     settings = StoredSettings(flash)
     settings.put("SetGain", {"Gain": 4.0})
@@ -78,7 +78,7 @@ def test_saved_settings_come_back_and_others_do_not() -> None:
     assert StoredSettings(flash).get("SetGain", "Gain") == 15.0
 
 
-def test_the_body_rotation_is_kept_at_once_and_survives_erasing_the_rest() -> None:
+def test_body_rotation_is_stored_at_once_and_survives_an_erase() -> None:
     flash = FlashStore()
     settings = StoredSettings(flash)
     settings.put("SetBodyRotation", TURN)
@@ -90,7 +90,7 @@ def test_the_body_rotation_is_kept_at_once_and_survives_erasing_the_rest() -> No
 @pytest.mark.parametrize(
     "damage", [lambda b: b[:-1], lambda b: b"", lambda b: bytes([b[0] ^ 1]) + b[1:]]
 )
-def test_damaged_pages_are_noticed_and_left_out(page: str, damage: Any) -> None:
+def test_damaged_settings_pages_are_detected_and_ignored(page: str, damage: Any) -> None:
     flash = FlashStore()
     settings = StoredSettings(flash)
     settings.put("SetGain", {"Gain": 4.0})
@@ -106,7 +106,7 @@ def test_damaged_pages_are_noticed_and_left_out(page: str, damage: Any) -> None:
 EXTENDED = AramisSwitches.of("extended")
 
 
-def test_a_boresight_is_that_of_the_latest_measurement_if_it_gave_one() -> None:
+def test_hint_is_the_boresight_of_a_conclusive_latest_measurement_only() -> None:
     """An older attitude is no hint for the next measurement."""
     state = State(FlashStore())
     measuring = Measuring(Meter(BLACKFIN_BF533), state, None, None)  # type: ignore[arg-type]
@@ -120,7 +120,7 @@ def test_a_boresight_is_that_of_the_latest_measurement_if_it_gave_one() -> None:
         assert measuring.latest_boresight() is None
 
 
-def test_reset_values_are_the_verified_way() -> None:
+def test_default_settings_select_the_verified_profile() -> None:
     found = configuration(StoredSettings(FlashStore()), EXTENDED)
     assert found.detection == VERIFIED.detection
     assert found.field.fov_deg == pytest.approx(VERIFIED.field.fov_deg, abs=1e-5)
@@ -128,7 +128,7 @@ def test_reset_values_are_the_verified_way() -> None:
     assert found.profile.verify
 
 
-def test_every_setting_arrives() -> None:
+def test_stored_settings_reach_the_measurement_configuration() -> None:
     settings = StoredSettings(FlashStore())
     settings.put("SetField", {"FieldOfView": 18.0, "Round": 0})
     sizes = {"MinPixels": 4, "MaxPixels": 99, "MaxStars": 12}
@@ -144,7 +144,7 @@ def test_every_setting_arrives() -> None:
     assert (profile.pivots, profile.verify, profile.hint_tolerance_deg) == (1, False, 9)
 
 
-def test_what_a_switch_has_as_printed_no_setting_changes() -> None:
+def test_settings_do_not_override_printed_switches() -> None:
     settings, printed = StoredSettings(FlashStore()), AramisSwitches.of("published")
     before = configuration(settings, printed)
     assert not before.detection.subtract
@@ -157,7 +157,7 @@ def test_what_a_switch_has_as_printed_no_setting_changes() -> None:
 
 
 @given(st.data())
-def test_whatever_the_tables_allow_is_allowed_by_the_processing(data: st.DataObject) -> None:
+def test_processing_accepts_all_settings_allowed_by_the_tables(data: st.DataObject) -> None:
     settings = StoredSettings(FlashStore())
     for name in ("SetField", "SetDetection", "SetIdentification"):
         message = INTERFACE.telecommand(name)
@@ -169,12 +169,12 @@ def test_whatever_the_tables_allow_is_allowed_by_the_processing(data: st.DataObj
 
 
 @given(st.integers(0, 2**32 - 1))
-def test_the_body_s_attitude_is_the_rotations_product(seed: int) -> None:
+def test_body_quaternion_is_the_product_of_both_rotations(seed: int) -> None:
     turn, attitude = Rotation.random(2, random_state=np.random.default_rng(seed))
     found = body_quaternion(*(one.as_quat().astype(np.float32) for one in (turn, attitude)))
     assert ((turn * attitude).inv() * Rotation.from_quat(found)).magnitude() < 1e-6
 
 
-def test_the_smallest_star_may_not_exceed_the_largest() -> None:
+def test_min_pixels_must_not_exceed_max_pixels() -> None:
     with pytest.raises(ValueError, match="min_pixels must be 1 to 8 px, not 9"):
         DetectionSettings(min_pixels=9, max_pixels=8)

@@ -37,14 +37,14 @@ def brown(p: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.array([539.0 + 1147.5 * u, 175.5 + 1147.4 * v])
 
 
-def test_every_part_of_the_picture_is_undistorted_as_the_equations_say() -> None:
+def test_undistortion_follows_the_published_equations_everywhere() -> None:
     points = np.random.default_rng(1).uniform([0, 0], [1023, 511], (300, 2)).astype(np.float32)
     expected = [brown(p) for p in points.astype(np.float64)]
     np.testing.assert_allclose(undistort(points, C, Meter(CORTEX_M3)), expected, atol=5e-4)
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_directions_come_back_from_a_camera_that_inverts_the_equations(seed: int) -> None:
+def test_undistort_inverts_an_exact_camera(seed: int) -> None:
     rng = np.random.default_rng(seed)
     ray = np.array([rng.uniform(-0.4, 0.38), rng.uniform(-0.14, 0.28), 1.0])
     pinhole = np.array([539.0, 175.5]) + 6.28 / 0.0056 * ray[:2]
@@ -55,7 +55,7 @@ def test_directions_come_back_from_a_camera_that_inverts_the_equations(seed: int
     assert math.dist(found, ray / np.linalg.norm(ray)) < 1e-6
 
 
-def test_the_charge_grows_with_the_number_of_points() -> None:
+def test_undistortion_cost_is_proportional_to_the_points() -> None:
     costs = []
     for count in (0, 1, 11):
         meter = Meter(CORTEX_M3)
@@ -92,25 +92,25 @@ def units(found: NDArray[np.float32], wanted: NDArray[np.float64]) -> float:
     return float(np.max(np.abs(found - wanted) / np.spacing(np.abs(wanted).astype(F))))
 
 
-def test_the_arc_cosine_is_good_to_the_last_places() -> None:
+def test_arc_cosine_is_accurate_to_2_ulp() -> None:
     x = np.concatenate([RNG.uniform(-1, 1, 100_000), 1 - np.logspace(-7, -1, 1000)]).astype(F)
     assert units(arc_cosine(x), np.arccos(x.astype(float))) < 2
 
 
-def test_the_arc_tangent_is_good_to_the_last_places() -> None:
+def test_arc_tangent_is_accurate_to_the_last_places() -> None:
     y, x = RNG.normal(size=(2, 100_000)).astype(F)
     assert units(arc_tangent(y, x), np.arctan2(y.astype(float), x.astype(float))) < 3
 
 
 @pytest.mark.parametrize(("function", "exact"), [(sine, np.sin), (cosine, np.cos)])
-def test_waves_are_good_to_the_last_places_of_1(
+def test_sine_and_cosine_errors_are_below_2_to_the_minus_23(
     function: Callable[[Any], NDArray[np.float32]], exact: Callable[[Any], Any]
 ) -> None:
     x = RNG.uniform(-np.pi, 2 * np.pi, 100_000).astype(F)
     assert np.max(np.abs(function(x) - exact(x.astype(float)))) < 2**-23
 
 
-def test_special_points() -> None:
+def test_arc_functions_are_exact_at_special_points() -> None:
     assert arc_cosine(np.array([1, 0.5, 0, -0.5, -1], F)).tolist() == pytest.approx(
         [0, math.pi / 3, math.pi / 2, 2 * math.pi / 3, math.pi], rel=1e-7
     )
@@ -139,7 +139,7 @@ def rays_ahead(seed: int, count: int) -> NDArray[np.float64]:
 
 
 @pytest.mark.parametrize("factor", [1.0, 0.98])
-def test_it_is_that_of_the_lens(factor: float) -> None:
+def test_field_of_view_matches_the_lens(factor: float) -> None:
     rays = rays_ahead(1, 4000)
     pixels = LENS.project(rays)
     pixels[np.isnan(pixels)] = -999.0
@@ -152,7 +152,7 @@ def test_it_is_that_of_the_lens(factor: float) -> None:
     assert 500 < np.count_nonzero(inside) < 3500
 
 
-def test_it_ends_at_the_outer_edges_of_the_pixels() -> None:
+def test_field_of_view_ends_at_the_outer_pixel_edges() -> None:
     focal_px, middle = 1000.0, np.array([COLUMNS / 2, ROWS / 2]) - 0.5
     camera = CameraParameters(6.0, focal_px, focal_px, *middle, 0, 0, 0, 0, pitch_mm=0.006)
     field = field_of_view(camera, COLUMNS, ROWS)
@@ -164,7 +164,7 @@ def test_it_ends_at_the_outer_edges_of_the_pixels() -> None:
             assert field.contains(rays, Meter(CORTEX_M3)).tolist() == [True, False]
 
 
-def test_its_solid_angle_is_the_part_of_the_sphere() -> None:
+def test_field_solid_angle_matches_sampling() -> None:
     rng = np.random.default_rng(2)
     rays = rng.normal(size=(400_000, 3))
     rays /= np.linalg.norm(rays, axis=1, keepdims=True)
@@ -175,7 +175,7 @@ def test_its_solid_angle_is_the_part_of_the_sphere() -> None:
     assert ahead[field.contains(ahead, Meter(CORTEX_M3)), 2].min() < field.smallest_cosine + 0.01
 
 
-def test_nothing_is_seen_in_blind_cells_and_the_field_is_that_much_smaller() -> None:
+def test_blind_cells_are_excluded_from_the_field_of_view() -> None:
     field = calibrated(LENS)
     cell = 64
     blind = np.zeros((ROWS // cell, COLUMNS // cell), np.bool_)

@@ -79,7 +79,7 @@ CASES: dict[str, Callable[[int, Meter], object]] = {
 
 @pytest.mark.parametrize("count", [4, 13])
 @pytest.mark.parametrize("name", CASES)
-def test_charges(name: str, count: int) -> None:
+def test_attitude_solvers_charge_the_recorded_operations(name: str, count: int) -> None:
     meter = Meter(CORTEX_M3)
     CASES[name](count, meter)
     as_on_record(f"attitude: {name}, {count} stars", meter)
@@ -129,7 +129,7 @@ OTHERWISE = {
 
 
 @pytest.mark.parametrize("name", COUNTED)
-def test_a_further_star_is_charged_what_its_numbers_see(name: str) -> None:
+def test_each_further_star_charges_the_operations_it_needs(name: str) -> None:
     routine, otherwise = COUNTED[name], OTHERWISE.get(name, {})
     charged: Counter[str] = Counter()
     seen_by_them: Counter[str] = Counter()

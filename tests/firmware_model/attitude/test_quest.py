@@ -42,7 +42,7 @@ def attitude_of(quaternion: NDArray[np.float32]) -> Matrix:
 
 
 @pytest.mark.parametrize("seed", range(200))
-def test_noisy_vectors_give_the_best_attitude(seed: int) -> None:
+def test_quest_finds_the_optimal_attitude_of_noisy_vectors(seed: int) -> None:
     rng = np.random.default_rng(seed)
     count = int(rng.integers(3, 21))
     truth = Rotation.random(random_state=rng).as_matrix()
@@ -90,7 +90,9 @@ def test_two_stars_determine_the_attitude() -> None:
         ([[0, 0, 1], [0.6, 0, 0.8]], [0, 0], "add up to 0"),
     ],
 )
-def test_rejects_bad_vectors(body: list[list[float]], weights: list[float], message: str) -> None:
+def test_quest_rejects_vectors_that_determine_no_attitude(
+    body: list[list[float]], weights: list[float], message: str
+) -> None:
     with pytest.raises(AttitudeError, match=message):
         solve(np.array(body), np.array(body), np.array(weights, dtype=float))
 
@@ -120,7 +122,7 @@ class Counted(float):
         return Counted(float(self) - float(other))
 
 
-def test_a_determinant_is_charged_what_its_numbers_see() -> None:
+def test_determinant_charges_the_operations_it_performs() -> None:
     values = np.array([[2, 7, 6], [9, 5, 1], [4, 3, 8]])
     matrix = np.array([[Counted(value) for value in row] for row in values], dtype=object)
     meter = Meter(CORTEX_M3)

@@ -65,7 +65,7 @@ def shares(draw: Callable[[np.random.Generator], tuple[Floats, Floats, Rotation]
 
 
 @pytest.mark.parametrize("displaced", [0, 1, 3])
-def test_displaced_stars_do_not_turn_the_attitude(displaced: int) -> None:
+def test_displaced_stars_do_not_disturb_the_robust_fit(displaced: int) -> None:
     rng, robust, plain = np.random.default_rng(displaced), [], []
     for _ in range(60):
         measured, reference, truth = seen(rng)
@@ -90,7 +90,9 @@ def test_sigmas_hold_with_displaced_stars() -> None:
 
 @pytest.mark.parametrize("factor", quick([0.99, 0.999, 1.003, 1.0, 1.02], 2))
 @pytest.mark.parametrize("side", quick([0.3, 0.0], 1))
-def test_another_focal_length_is_found_where_there_is_one(factor: float, side: float) -> None:
+def test_robust_fit_estimates_a_focal_length_error_only_if_present(
+    factor: float, side: float
+) -> None:
     def draw(rng: np.random.Generator) -> tuple[Floats, Floats, Rotation]:
         measured, reference, truth = seen(rng, side=side)
         return scaled(measured, factor, METER), reference, truth
@@ -109,7 +111,7 @@ def test_a_first_guess_of_the_focal_length_is_refined() -> None:
     assert np.linalg.norm(error(fit.quaternion, truth)) < 5e-5
 
 
-def test_a_belief_that_is_too_small_blames_no_star() -> None:
+def test_robust_fit_rejects_no_star_when_sigma_is_underestimated() -> None:
     """Residuals five times as large as believed are taken for the belief's fault."""
     rng, apart = np.random.default_rng(1), []
     for _ in range(40):
@@ -153,11 +155,11 @@ def test_sigmas_hold_with_uneven_stars() -> None:
 
 
 @pytest.mark.parametrize("declared", [0.6, 1.6])
-def test_residuals_correct_a_wrong_belief(declared: float) -> None:
+def test_covariance_adapts_to_residuals_when_sigma_is_misstated(declared: float) -> None:
     hold(*axis_shares(15, 2e-4, 5, declared=declared), low=0.6)
 
 
-def test_refuses_what_determines_no_attitude() -> None:
+def test_covariance_refuses_vectors_that_determine_no_attitude() -> None:
     three, nothing = np.array([[0, 0, 1]] * 3, np.float32), np.zeros(3, np.float32)
     sigmas = np.ones(3, np.float32)
     with pytest.raises(AttitudeError, match="2 stars, not 1"):
@@ -166,7 +168,7 @@ def test_refuses_what_determines_no_attitude() -> None:
         covariance(three, nothing, sigmas, METER)
 
 
-def test_residuals_beyond_what_chance_gives_count_more() -> None:
+def test_residuals_above_expectation_enlarge_the_covariance() -> None:
     rng = np.random.default_rng(9)
     body = seen(rng)[0]
     sigmas = np.full(12, 1e-4, np.float32)

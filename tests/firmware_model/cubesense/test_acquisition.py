@@ -68,7 +68,9 @@ IMAGE_BYTES = ROWS * COLUMNS
         (Camera.NADIR, Sram.SRAM1, Actions(Action.STORE_OTHER, Action.SEND_PICTURE)),
     ],
 )
-def test_a_picture_goes_to_its_memory(rig: Rig, camera: Camera, sram: Sram, row: Actions) -> None:
+def test_image_is_stored_in_the_selected_memory(
+    rig: Rig, camera: Camera, sram: Sram, row: Actions
+) -> None:
     rig.scenes[camera] = picture = earth(0, 0)
     other = Sram(1 - sram)
     kept = rig.memories[other].copy()
@@ -80,7 +82,7 @@ def test_a_picture_goes_to_its_memory(rig: Rig, camera: Camera, sram: Sram, row:
 
 
 @pytest.mark.parametrize("sram", Sram)
-def test_a_dead_camera_costs_two_frames_and_no_picture(rig: Rig, sram: Sram) -> None:
+def test_dead_camera_times_out_after_two_frames_and_keeps_the_memory(rig: Rig, sram: Sram) -> None:
     rig.scenes[Camera.SUN] = None
     kept = rig.memories[sram].copy()
     start_us = rig.now_us
@@ -90,7 +92,7 @@ def test_a_dead_camera_costs_two_frames_and_no_picture(rig: Rig, sram: Sram) -> 
     assert rig.pins["SUNEN"] == rig.pins["NADEN"] == 1
 
 
-def test_the_longest_wait_for_a_live_camera_is_no_timeout(rig: Rig) -> None:
+def test_longest_wait_for_a_live_camera_does_not_time_out(rig: Rig) -> None:
     rig.wait_us = 2 * FRAME_US - READ_OUT_US
     assert rig.store(Camera.SUN, Sram.SRAM1) is CaptureResult.STORED_OWN_SRAM
 
@@ -107,14 +109,14 @@ def test_a_latch_up_ends_the_wait_at_once(rig: Rig, camera: Camera) -> None:
     assert rig.log == []  # nothing is tried with a memory that is off
 
 
-def test_a_latch_up_of_the_other_memory_does_not_disturb(rig: Rig) -> None:
+def test_latch_up_of_the_other_memory_does_not_disturb_a_store(rig: Rig) -> None:
     rig.latched.add(Sram.SRAM2)
     assert rig.store(Camera.SUN, Sram.SRAM1) is CaptureResult.STORED_OWN_SRAM
     assert rig.cut() == {Sram.SRAM2}
 
 
 @pytest.mark.parametrize("sram", Sram)
-def test_the_nadir_scan_from_either_memory(rig: Rig, sram: Sram) -> None:
+def test_nadir_scan_reads_from_either_memory(rig: Rig, sram: Sram) -> None:
     rig.memories[sram] = picture = earth(5, 5)
     lines = NadirLines(EdgeConfig(), rig.meter, buffer=rig.acquisition.buffers[0])
     assert rig.perform(rig.acquisition.scan(sram, lines)) is True
@@ -126,7 +128,7 @@ def test_the_nadir_scan_from_either_memory(rig: Rig, sram: Sram) -> None:
 
 
 @pytest.mark.parametrize("sram", Sram)
-def test_the_suns_window_from_either_memory(rig: Rig, sram: Sram) -> None:
+def test_sun_window_is_read_from_either_memory(rig: Rig, sram: Sram) -> None:
     rig.memories[sram] = picture = sun(np.array([300.0, 200.0]), 6)
     data = rig.perform(rig.acquisition.window(sram))
     assert np.array_equal(data, window(picture))
@@ -157,7 +159,7 @@ def test_a_latch_up_is_noticed_before_the_next_line_is_read(rig: Rig) -> None:
     assert rig.pins["SUNEN"] == rig.pins["NADEN"] == 1
 
 
-def test_a_latch_up_spoils_the_suns_window(rig: Rig) -> None:
+def test_latch_up_during_the_sun_window_read_returns_none(rig: Rig) -> None:
     latch_after(rig, Sram.SRAM1, 1)
     assert rig.perform(rig.acquisition.window(Sram.SRAM1)) is None
 
@@ -174,7 +176,7 @@ def parts(rng: np.random.Generator) -> Iterator[tuple[int, int]]:
 
 @pytest.mark.parametrize("mcu_addressing", [False, True])
 @pytest.mark.parametrize("sram", Sram)
-def test_a_picture_is_read_in_parts(sram: Sram, mcu_addressing: bool) -> None:
+def test_image_is_read_and_skipped_in_parts(sram: Sram, mcu_addressing: bool) -> None:
     rig = Rig(mcu_addressing=mcu_addressing)
     acquisition, picture = rig.acquisition, rig.memories[sram].reshape(-1)
     assert rig.perform(acquisition.open_image(sram)) is True
@@ -189,7 +191,7 @@ def test_a_picture_is_read_in_parts(sram: Sram, mcu_addressing: bool) -> None:
     assert np.array_equal(rig.memories[sram].reshape(-1), picture)
 
 
-def test_addresses_save_the_clocks_of_what_is_skipped() -> None:
+def test_addressing_saves_the_clocks_of_skipped_bytes() -> None:
     times = []
     for mcu_addressing in (False, True):
         rig = Rig(mcu_addressing=mcu_addressing)
@@ -202,7 +204,7 @@ def test_addresses_save_the_clocks_of_what_is_skipped() -> None:
     assert addressed_us < 30
 
 
-def test_a_picture_is_closed_by_any_other_command(rig: Rig) -> None:
+def test_any_other_command_closes_the_open_image(rig: Rig) -> None:
     target = np.zeros(10, np.uint8)
     for other in (
         rig.acquisition.store(Camera.NADIR, Sram.SRAM2),
@@ -216,7 +218,7 @@ def test_a_picture_is_closed_by_any_other_command(rig: Rig) -> None:
         assert not rig.acquisition.image_open
 
 
-def test_a_picture_in_a_memory_that_is_off(rig: Rig) -> None:
+def test_latch_up_closes_the_open_image_and_prevents_reopening(rig: Rig) -> None:
     target = np.zeros(5000, np.uint8)
     rig.perform(rig.acquisition.open_image(Sram.SRAM1))
     latch_after(rig, Sram.SRAM1, 1000)
@@ -226,7 +228,7 @@ def test_a_picture_in_a_memory_that_is_off(rig: Rig) -> None:
     assert rig.perform(rig.acquisition.open_image(Sram.SRAM1)) is False
 
 
-def test_single_pixels_by_address() -> None:
+def test_acquisition_reads_single_pixels_by_address() -> None:
     rig = Rig(mcu_addressing=True)
     rig.memories[Sram.SRAM2] = picture = earth(-12, 4)
     meter = rig.meter
@@ -239,14 +241,14 @@ def test_single_pixels_by_address() -> None:
     assert rig.perform(rig.acquisition.answer(Sram.SRAM2, search)) is None
 
 
-def test_which_pictures_can_be_addressed() -> None:
+def test_only_own_memories_can_be_addressed_with_the_option() -> None:
     own = {(Camera.SUN, Sram.SRAM1), (Camera.NADIR, Sram.SRAM2)}
     for mcu_addressing, expected in ((False, set()), (True, own)):
         can_address = Rig(mcu_addressing=mcu_addressing).acquisition.can_address
         assert {pair for pair in product(Camera, Sram) if can_address(*pair)} == expected
 
 
-def test_an_addressed_pixel_costs_what_the_table_says() -> None:
+def test_addressed_pixel_read_costs_the_tabulated_cycles() -> None:
     rig = Rig(mcu_addressing=True)
     asked: NDArray[np.int64] = np.array([[0, 0], [639, 479], [63, 15]])
 

@@ -26,7 +26,9 @@ def test_both_cameras_are_set_up_at_start(unit: Harness) -> None:
     assert unit.cameras[Camera.NADIR].registers == {**AT_START, "EXPOSURE": 4}
 
 
-def test_the_bus_is_as_the_camera_wants_it(unit: Harness, caplog: pytest.LogCaptureFixture) -> None:
+def test_camera_bus_timing_satisfies_the_camera(
+    unit: Harness, caplog: pytest.LogCaptureFixture
+) -> None:
     unit.cameras[Camera.NADIR].writes.clear()
     unit.log.clear()
     unit.command("Reset", Target=ResetTarget.CAMERAS)
@@ -36,7 +38,7 @@ def test_the_bus_is_as_the_camera_wants_it(unit: Harness, caplog: pytest.LogCapt
     assert np.median(np.diff(risen_us)) < 6
 
 
-def test_a_register_takes_about_a_hundred_requests(unit: Harness) -> None:
+def test_camera_register_write_takes_fewer_than_100_pin_requests(unit: Harness) -> None:
     unit.log.clear()
     unit.command("CameraSettings1", Exposure=77, Gain=1)
     capture(unit)
@@ -57,7 +59,7 @@ def test_registers_are_written_again_only_when_a_setting_changed(unit: Harness) 
     assert len(camera.writes) == len(AT_START) + 1
 
 
-def test_the_new_exposure_has_settled_before_a_frame_is_looked_for(unit: Harness) -> None:
+def test_capture_waits_for_a_new_exposure_to_settle(unit: Harness) -> None:
     unit.command("CameraSettings1", Exposure=2)
     unit.log.clear()
     capture(unit)
@@ -70,7 +72,7 @@ def test_the_new_exposure_has_settled_before_a_frame_is_looked_for(unit: Harness
     assert EXPOSURE_SETTLE_US > (525 + 45) * 858 / 13.5
 
 
-def test_a_camera_reset_cycles_the_supply_and_sets_up_again(unit: Harness) -> None:
+def test_camera_reset_cycles_the_supply_and_restores_the_settings(unit: Harness) -> None:
     unit.command("CameraSettings1", Exposure=9)
     capture(unit)
     unit.log.clear()
@@ -81,7 +83,7 @@ def test_a_camera_reset_cycles_the_supply_and_sets_up_again(unit: Harness) -> No
     assert unit.cameras[Camera.SUN].registers == {**AT_START, "EXPOSURE": 9}
 
 
-def test_a_camera_without_an_answer_is_tried_before_each_picture(unit: Harness) -> None:
+def test_silent_camera_is_retried_before_each_capture(unit: Harness) -> None:
     camera = unit.cameras[Camera.SUN]
     camera.answers = False
     unit.command("CameraSettings1", Exposure=9)

@@ -51,11 +51,11 @@ LENS = INTERFACE.telecommand("Distortion2").reset_values()
         for message in INTERFACE.telecommands
     ],
 )
-def test_every_telecommand_does_what_it_says(unit: Harness, name: str) -> None:
+def test_every_telecommand_has_its_documented_effect(unit: Harness, name: str) -> None:
     EFFECTS[name](unit)
 
 
-def test_every_telecommand_has_an_effect_and_no_other_does(unit: Harness) -> None:
+def test_telecommands_handled_tested_and_declared_are_the_same(unit: Harness) -> None:
     declared = {message.name for message in INTERFACE.telecommands}
     assert unit.program.commands.handled == EFFECTS.keys() == declared
 
@@ -258,12 +258,14 @@ def set_switches(_: Harness) -> None:
     assert seen[2][0] > seen[0][0] + 400
 
 
-def test_a_search_that_the_fpgas_are_not_built_for_is_refused(unit: Harness) -> None:
+def test_telecommand_refuses_a_search_unsupported_by_the_fpgas(unit: Harness) -> None:
     assert unit.send("SetNadirSearch", Search=codes.NadirSearch.AROUND_SAMPLES) == 3
     assert unit.send("SetNadirSearch", Search=codes.NadirSearch.LINES) == 0
 
 
-def test_a_lens_without_table(unit: Harness, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_lens_without_an_inverse_table_is_refused_and_the_old_one_kept(
+    unit: Harness, monkeypatch: pytest.MonkeyPatch
+) -> None:
     lit(unit)
     monkeypatch.setattr("cubestack.firmware_model.cubesense.links.node.invertible", lambda *_: True)
     unit.command("Distortion1", **{f"Mantissa{power}": 0 for power in range(5)})
@@ -302,7 +304,9 @@ def test_telecommands_are_executed_in_order(unit: Harness) -> None:
 
 
 @pytest.mark.parametrize("more", [False, True])
-def test_a_reset_drops_what_waits_and_is_not_processed_before(unit: Harness, more: bool) -> None:
+def test_reset_drops_waiting_telecommands_and_is_counted_afterwards(
+    unit: Harness, more: bool
+) -> None:
     unit.send("Reset", Target=codes.ResetTarget.MCU)
     seen: list[tuple[int, int]] = []
     unit.on_request = lambda _request: seen.append(

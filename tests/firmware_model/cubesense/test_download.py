@@ -24,7 +24,7 @@ def expected(node: Links, sram: codes.Sram, size: codes.ImageSize) -> list[bytes
 
 
 @pytest.mark.parametrize("size", codes.ImageSize)
-def test_a_download_reads_the_picture_once(node: Links, size: codes.ImageSize) -> None:
+def test_image_download_reads_the_memory_once(node: Links, size: codes.ImageSize) -> None:
     sram = codes.Sram(size % 2)
     node.command("StartImageDownload", Sram=sram, Size=size)
     download = node.commands.download
@@ -39,7 +39,7 @@ def test_a_download_reads_the_picture_once(node: Links, size: codes.ImageSize) -
     assert node.read + node.skipped <= codes.IMAGE_BYTES
 
 
-def test_frames_in_any_order(node: Links) -> None:
+def test_image_frames_are_downloaded_in_any_order(node: Links) -> None:
     size = codes.ImageSize.SIDE_128
     frames = expected(node, codes.Sram.SRAM2, size)
     node.command("StartImageDownload", Sram=codes.Sram.SRAM2, Size=size)
@@ -48,14 +48,14 @@ def test_frames_in_any_order(node: Links) -> None:
         assert shown(node, int(number)) == frames[number]
 
 
-def test_going_back_begins_anew_and_going_on_does_not(node: Links) -> None:
+def test_only_backward_image_frame_requests_reopen_the_image(node: Links) -> None:
     node.command("StartImageDownload", Size=codes.ImageSize.SIDE_256)
     for number, begun in ((200, 1), (300, 1), (299, 2), (299, 3), (301, 3)):
         node.command("NextImageFrame", Frame=number)
         assert len(node.opened) == begun
 
 
-def test_a_measurement_in_between_costs_a_new_beginning_only(node: Links) -> None:
+def test_capture_during_an_image_download_only_reopens_the_image(node: Links) -> None:
     size = codes.ImageSize.SIDE_64
     frames = expected(node, codes.Sram.SRAM1, size)
     node.command("StartImageDownload", Size=size)
@@ -66,7 +66,7 @@ def test_a_measurement_in_between_costs_a_new_beginning_only(node: Links) -> Non
     assert len(node.opened) == 10
 
 
-def test_a_frame_further_on_in_the_other_memory_is_read_there(node: Links) -> None:
+def test_download_starts_at_a_later_frame_of_the_other_memory(node: Links) -> None:
     size = codes.ImageSize.SIDE_64
     places = (codes.Sram.SRAM1, 10), (codes.Sram.SRAM2, 15)
     for begun, (sram, number) in enumerate(places, start=1):
@@ -77,7 +77,7 @@ def test_a_frame_further_on_in_the_other_memory_is_read_there(node: Links) -> No
         assert len(node.opened) == begun
 
 
-def test_no_frame_is_ready_from_the_request_on(node: Links) -> None:
+def test_no_image_frame_is_ready_until_its_request_is_served(node: Links) -> None:
     node.command("StartImageDownload", Size=codes.ImageSize.SIDE_64)
     seen: list[int] = []
     node.send("NextImageFrame", Frame=0)  # the one that is ready already
@@ -88,7 +88,7 @@ def test_no_frame_is_ready_from_the_request_on(node: Links) -> None:
     assert ready(node) == 0
 
 
-def test_a_request_that_was_overtaken_while_it_waits_is_not_read(node: Links) -> None:
+def test_frame_request_replaced_while_waiting_is_not_read(node: Links) -> None:
     node.command("StartImageDownload", Size=codes.ImageSize.SIDE_64)
     node.send("NextImageFrame", Frame=12)
     node.command("NextImageFrame", Frame=14)
@@ -97,7 +97,7 @@ def test_a_request_that_was_overtaken_while_it_waits_is_not_read(node: Links) ->
     assert node.telemetry("TcmdProcessed")["Processed"] == 1
 
 
-def test_a_request_that_was_overtaken_while_it_is_read_is_never_ready(node: Links) -> None:
+def test_frame_request_replaced_during_its_read_is_never_ready(node: Links) -> None:
     node.command("StartImageDownload", Size=codes.ImageSize.SIDE_64)
     node.send("NextImageFrame", Frame=14)
     seen = set()
@@ -117,7 +117,7 @@ def test_a_request_that_was_overtaken_while_it_is_read_is_never_ready(node: Link
 
 
 @pytest.mark.parametrize("when", ["before", "meanwhile"])
-def test_a_memory_without_supply_has_no_frame(node: Links, when: str) -> None:
+def test_image_frame_of_an_unpowered_memory_is_empty(node: Links, when: str) -> None:
     size = codes.ImageSize.SIDE_64
     node.command("StartImageDownload", Size=size)
     node.send("NextImageFrame", Frame=15)
@@ -134,7 +134,7 @@ def test_a_memory_without_supply_has_no_frame(node: Links, when: str) -> None:
     assert shown(node, 15) == expected(node, codes.Sram.SRAM1, size)[15]
 
 
-def test_frames_beyond_the_picture_need_no_memory(node: Links) -> None:
+def test_image_frames_beyond_the_image_need_no_memory(node: Links) -> None:
     node.off = {codes.Sram.SRAM1}
     node.command("StartImageDownload", Size=codes.ImageSize.SIDE_64)
     assert shown(node, 0) == bytes(128)
@@ -142,7 +142,7 @@ def test_frames_beyond_the_picture_need_no_memory(node: Links) -> None:
 
 
 @pytest.mark.parametrize("size", codes.ImageSize)
-def test_the_square_is_padded_and_thinned(size: codes.ImageSize) -> None:
+def test_thumbnail_is_padded_to_a_square_and_subsampled(size: codes.ImageSize) -> None:
     picture = np.random.default_rng(3).integers(1, 256, (480, 640), np.uint8)
     canvas = np.pad(picture, ((272, 272), (192, 192)))
     assert canvas.shape == (1024, 1024)

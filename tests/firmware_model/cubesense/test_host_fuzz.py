@@ -120,7 +120,7 @@ def stays_sane(unit: Harness) -> None:
 
 
 @pytest.mark.parametrize(("seed", "mcu_addressing"), [(0, False), (1, True)])
-def test_random_bytes_on_every_bus_at_any_time(seed: int, mcu_addressing: bool) -> None:
+def test_random_bytes_on_every_bus_do_not_harm_the_node(seed: int, mcu_addressing: bool) -> None:
     unit = Harness(mcu_addressing=mcu_addressing)
     rng = np.random.default_rng(seed)
     turns: tuple[Turn, ...] = (uart, framed, framed, letters, i2c, i2c, transitions, latch_up)
@@ -131,7 +131,7 @@ def test_random_bytes_on_every_bus_at_any_time(seed: int, mcu_addressing: bool) 
 
 
 @pytest.mark.parametrize("seed", quick(range(2), 1))
-def test_random_bytes_during_any_operation(seed: int) -> None:
+def test_random_bytes_during_any_operation_do_not_harm_the_node(seed: int) -> None:
     """Interrupts come at every request of the program, not only where it sleeps."""
     unit = Harness()
     rng = np.random.default_rng(100 + seed)
@@ -175,12 +175,12 @@ STEPS: list[Step] = [
 
 
 @pytest.mark.parametrize("profile", ["published", "extended"])
-def test_session(unit: Harness, profile: str) -> None:
+def test_cubesense_session_matches_its_recording(unit: Harness, profile: str) -> None:
     lit(unit)
     as_recorded(unit, f"CubeSense session, {profile}", STEPS)
 
 
-def test_session_of_addressed_pixels() -> None:
+def test_cubesense_session_with_addressing_matches_its_recording() -> None:
     unit = Harness(CubeSenseSwitches.of("extended"), mcu_addressing=True)
     lit(unit)
     as_recorded(unit, "CubeSense session, addressed", STEPS[4:8])

@@ -74,7 +74,9 @@ def edges_of(unit: Harness) -> set[tuple[float, float]]:
 @pytest.mark.parametrize("profile", ["extended"])
 @pytest.mark.parametrize("sram", Sram)
 @pytest.mark.parametrize("truth", [(0.0, 0.0), (25.0, -40.0), (-60.0, 35.0)])
-def test_the_sun_in_either_memory(unit: Harness, sram: Sram, truth: tuple[float, float]) -> None:
+def test_sun_is_measured_from_either_memory(
+    unit: Harness, sram: Sram, truth: tuple[float, float]
+) -> None:
     unit.scenes[Camera.SUN] = picture = sun_at(*truth)
     measured = measure(unit, Camera.SUN, sram)
     assert outcome(measured) == (stored(Camera.SUN, sram), DetectResult.SUCCESS)
@@ -90,7 +92,9 @@ def test_the_sun_in_either_memory(unit: Harness, sram: Sram, truth: tuple[float,
 @pytest.mark.parametrize("profile", ["extended"])
 @pytest.mark.parametrize("sram", Sram)
 @pytest.mark.parametrize("truth", [(0.0, 0.0), (15.0, -25.0), (-40.0, 30.0)])
-def test_the_earth_in_either_memory(unit: Harness, sram: Sram, truth: tuple[float, float]) -> None:
+def test_nadir_is_measured_from_either_memory(
+    unit: Harness, sram: Sram, truth: tuple[float, float]
+) -> None:
     unit.scenes[Camera.NADIR] = picture = earth(*truth)
     measured = measure(unit, Camera.NADIR, sram)
     assert outcome(measured) == (stored(Camera.NADIR, sram), DetectResult.SUCCESS)
@@ -117,7 +121,9 @@ def test_the_earth_in_either_memory(unit: Harness, sram: Sram, truth: tuple[floa
     ],
     ids=["dark", "bright", "behind", "chequered", "rectangle"],
 )
-def test_no_earth(unit: Harness, picture: NDArray[np.uint8], detect: DetectResult) -> None:
+def test_images_without_earth_report_a_detection_failure(
+    unit: Harness, picture: NDArray[np.uint8], detect: DetectResult
+) -> None:
     unit.scenes[Camera.NADIR] = earth(1, 2)
     measure(unit, Camera.NADIR)
     unit.scenes[Camera.NADIR] = picture
@@ -126,7 +132,7 @@ def test_no_earth(unit: Harness, picture: NDArray[np.uint8], detect: DetectResul
     assert (measured["Alpha"], measured["Beta"]) == (0, 0)
 
 
-def test_a_sun_picture_without_sun(unit: Harness) -> None:
+def test_sun_camera_image_without_sun_reports_sun_not_found(unit: Harness) -> None:
     measured = measure(unit, Camera.SUN)
     assert outcome(measured) == (CaptureResult.STORED_OWN_SRAM, DetectResult.SUN_NOT_FOUND)
     assert (measured["FirstX"], measured["FirstY"]) == (0x3FF, 0x1FF)
@@ -134,7 +140,9 @@ def test_a_sun_picture_without_sun(unit: Harness) -> None:
 
 @pytest.mark.parametrize("camera", Camera)
 @pytest.mark.parametrize("sram", Sram)
-def test_a_dead_camera(unit: Harness, camera: Camera, sram: Sram) -> None:
+def test_dead_camera_times_out_and_schedules_no_detection(
+    unit: Harness, camera: Camera, sram: Sram
+) -> None:
     unit.scenes[camera] = None
     unit.cameras[camera].answers = False
     measured = measure(unit, camera, sram)
@@ -145,7 +153,9 @@ def test_a_dead_camera(unit: Harness, camera: Camera, sram: Sram) -> None:
 
 @pytest.mark.parametrize("camera", Camera)
 @pytest.mark.parametrize("sram", Sram)
-def test_a_camera_that_failed_is_set_up_again(unit: Harness, camera: Camera, sram: Sram) -> None:
+def test_failed_camera_is_set_up_again_by_the_next_measurement(
+    unit: Harness, camera: Camera, sram: Sram
+) -> None:
     registers = dict(unit.cameras[camera].registers)
     other = dict(unit.cameras[Camera(1 - camera)].registers)
     scene, unit.scenes[camera] = unit.scenes[camera], None
@@ -161,7 +171,9 @@ def test_a_camera_that_failed_is_set_up_again(unit: Harness, camera: Camera, sra
 
 @pytest.mark.parametrize("camera", Camera)
 @pytest.mark.parametrize("sram", Sram)
-def test_a_latch_up_while_the_picture_is_stored(unit: Harness, camera: Camera, sram: Sram) -> None:
+def test_latch_up_during_the_store_is_reported_as_over_current(
+    unit: Harness, camera: Camera, sram: Sram
+) -> None:
     unit.latch_on(SetPin(("SUNEN", "NADEN")[camera], 0), sram)
     for _ in range(2):  # the second time it is off
         measured = measure(unit, camera, sram)
@@ -172,7 +184,9 @@ def test_a_latch_up_while_the_picture_is_stored(unit: Harness, camera: Camera, s
 @pytest.mark.parametrize("camera", Camera)
 @pytest.mark.parametrize("sram", Sram)
 @pytest.mark.parametrize("search", [NadirSearch.LINES, NadirSearch.AROUND_SAMPLES])
-def test_a_latch_up_under_the_search(camera: Camera, sram: Sram, search: NadirSearch) -> None:
+def test_latch_up_during_the_search_is_reported_as_over_current(
+    camera: Camera, sram: Sram, search: NadirSearch
+) -> None:
     unit = Harness(mcu_addressing=True)
     unit.command("SetNadirSearch", Search=search)
     unit.scenes[Camera.SUN], unit.scenes[Camera.NADIR] = sun_at(3, 4), earth(5, 6)
@@ -184,7 +198,7 @@ def test_a_latch_up_under_the_search(camera: Camera, sram: Sram, search: NadirSe
     assert outcome(measure(unit, camera, sram))[1] is DetectResult.SUCCESS
 
 
-def test_results_are_pending_until_they_are_there(unit: Harness) -> None:
+def test_results_are_pending_until_available(unit: Harness) -> None:
     unit.scenes[Camera.NADIR] = earth(5, 6)
     seen: list[tuple[CaptureResult, DetectResult]] = []
     assert unit.send("CaptureAndDetect", Camera=Camera.NADIR, Sram=Sram.SRAM2) == 0
@@ -200,7 +214,9 @@ def test_results_are_pending_until_they_are_there(unit: Harness) -> None:
 @pytest.mark.parametrize("profile", ["extended"])
 @pytest.mark.parametrize("camera", Camera)
 @pytest.mark.parametrize("other_is_dead", [False, True])
-def test_the_other_memory_serves(unit: Harness, camera: Camera, other_is_dead: bool) -> None:
+def test_measurement_uses_the_other_memory_when_one_failed(
+    unit: Harness, camera: Camera, other_is_dead: bool
+) -> None:
     unit.scenes[Camera.SUN], unit.scenes[Camera.NADIR] = sun_at(-20, 10), earth(-20, 10)
     unit.latched.add(Sram(camera))
     unit.run(until_us=unit.now_us + 10_000)
@@ -214,7 +230,7 @@ def test_the_other_memory_serves(unit: Harness, camera: Camera, other_is_dead: b
 
 @pytest.mark.parametrize("camera", Camera)
 @pytest.mark.parametrize("wait_us", [3_000, 17_500, 36_000])
-def test_times_are_the_timers(unit: Harness, camera: Camera, wait_us: int) -> None:
+def test_phase_times_match_the_timer(unit: Harness, camera: Camera, wait_us: int) -> None:
     unit.scenes[Camera.SUN], unit.scenes[Camera.NADIR] = sun_at(3, 4), earth(5, 6)
     unit.wait_us = wait_us
     unit.log.clear()
@@ -232,7 +248,7 @@ def test_times_are_the_timers(unit: Harness, camera: Camera, wait_us: int) -> No
 
 
 @pytest.mark.parametrize("profile", ["extended"])
-def test_the_published_times(unit: Harness) -> None:
+def test_extended_sun_and_nadir_times_are_88_and_347_ms(unit: Harness) -> None:
     """Section 7.4 measures 70.4 ms and 245.0 ms, 48 ms of it imaging; ours are upper bounds.
 
     The robust fit takes a second fit of all edges, its uncertainty, and a look around each edge.
@@ -248,7 +264,7 @@ def test_the_published_times(unit: Harness) -> None:
     assert totals[Camera.NADIR] == pytest.approx(347, abs=5)
 
 
-def test_the_wait_for_a_new_exposure_is_no_part_of_the_measurement(unit: Harness) -> None:
+def test_measurement_time_excludes_the_exposure_settling_wait(unit: Harness) -> None:
     unit.scenes[Camera.SUN] = sun_at(3, 4)
     before = measure(unit, Camera.SUN)["Total"]
     unit.command("CameraSettings1", Exposure=5)
@@ -259,7 +275,7 @@ def test_the_wait_for_a_new_exposure_is_no_part_of_the_measurement(unit: Harness
 
 
 @pytest.mark.parametrize("profile", ["extended"])
-def test_thresholds(unit: Harness) -> None:
+def test_detection_threshold_telecommands_affect_measurements(unit: Harness) -> None:
     unit.scenes[Camera.SUN] = sun_at(3, 4)
     unit.scenes[Camera.NADIR] = earth(5, 6, level=80)
     unit.command("DetectionThreshold2", Threshold=200)  # a third of it, from dark on, counts
@@ -270,7 +286,7 @@ def test_thresholds(unit: Harness) -> None:
 
 
 @pytest.mark.parametrize("profile", ["extended"])
-def test_the_boresight_moves_the_suns_centre(unit: Harness) -> None:
+def test_boresight_telecommand_shifts_the_sun_angles(unit: Harness) -> None:
     unit.scenes[Camera.SUN] = sun(np.array([369.0, 250.0]), 6)
     unit.command("Boresight1", X=359.5, Y=253.25)
     measured = measure(unit, Camera.SUN)
@@ -281,7 +297,7 @@ def test_the_boresight_moves_the_suns_centre(unit: Harness) -> None:
     assert measured["X"] == pytest.approx(9.5, abs=0.3)
 
 
-def test_a_mask_hides_the_sun_and_part_of_the_limb(unit: Harness) -> None:
+def test_mask_hides_the_sun_and_removes_masked_limb_edges(unit: Harness) -> None:
     unit.scenes[Camera.SUN], unit.scenes[Camera.NADIR] = sun_at(3, 4), earth(5, 6)
     x, y = place(3, 4, SUN_BORESIGHT).astype(int)
     unit.command("Mask1", Area=5, XMin=x - 20, XMax=x + 20, YMin=y - 20, YMax=y + 20)
@@ -296,7 +312,7 @@ def test_a_mask_hides_the_sun_and_part_of_the_limb(unit: Harness) -> None:
 
 
 @pytest.mark.parametrize("camera", Camera)
-def test_new_distortion_coefficients_make_a_new_table_once(unit: Harness, camera: Camera) -> None:
+def test_new_distortion_coefficients_rebuild_the_table_once(unit: Harness, camera: Camera) -> None:
     unit.scenes[Camera.SUN], unit.scenes[Camera.NADIR] = sun_at(40, 20), earth(20, 30)
     name = f"Distortion{camera + 1}"
     before = measure(unit, camera)
@@ -326,7 +342,9 @@ def test_new_distortion_coefficients_make_a_new_table_once(unit: Harness, camera
     ("search", "most"),
     [(NadirSearch.AROUND_SAMPLES, 250), (NadirSearch.AROUND_SAMPLES_STEPPING, 1200)],
 )
-def test_a_search_around_samples_finds_the_same(search: NadirSearch, most: int) -> None:
+def test_search_around_samples_finds_the_same_edges_as_search_by_lines(
+    search: NadirSearch, most: int
+) -> None:
     unit = Harness(mcu_addressing=True)
     unit.scenes[Camera.NADIR] = earth(-15, 20)
     lines = measure(unit, Camera.NADIR)
@@ -350,7 +368,7 @@ def answered(routine: Routine[int], now_us: int) -> int:
 
 
 @given(st.integers(0, 10**12), st.integers(0, 3_350_000))
-def test_a_duration_is_right_to_a_tick_across_the_timers_overflow(start: int, us: int) -> None:
+def test_duration_is_right_to_one_tick_across_timer_overflow(start: int, us: int) -> None:
     started = answered(read_ticks(), start)
     assert 0 <= started < 65536
     measured = microseconds(answered(ticks_since(started), start + us))
@@ -358,5 +376,5 @@ def test_a_duration_is_right_to_a_tick_across_the_timers_overflow(start: int, us
     assert -measured * 5 % 256 < 5  # whole ticks, rounded down to 1 us
 
 
-def test_a_tick_is_51_2_us() -> None:
+def test_timer_tick_is_51_2_us() -> None:
     assert (microseconds(1000), ticks_of(51_200), ticks_of(51_199)) == (51_200, 1000, 999)

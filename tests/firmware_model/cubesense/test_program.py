@@ -22,7 +22,7 @@ from .harness import LOST, Harness
 from .scenery import chequered, earth
 
 
-def test_memories_come_on_before_cameras_and_both_are_ready_soon(unit: Harness) -> None:
+def test_memories_are_powered_before_cameras_within_10_ms(unit: Harness) -> None:
     switched = [r.pin for _, r in unit.log if isinstance(r, SetPin) and "POWER" in r.pin]
     assert switched == [*pins.SRAM_POWER.values(), *pins.CAMERA_POWER.values()]
     assert unit.now_us - Harness.boot_us < 10_000
@@ -37,7 +37,7 @@ def test_nothing_starts_without_a_command(unit: Harness) -> None:
     assert 1_000_000 / SAMPLE_US * 0.9 < unit.meter.counts["adc_conversion"] / 2 < 220
 
 
-def test_jobs_are_done_in_their_order(unit: Harness) -> None:
+def test_queued_captures_run_in_order(unit: Harness) -> None:
     unit.scenes[codes.Camera.NADIR] = earth(5, 5)
     for camera, sram in ((0, 1), (1, 0), (1, 1), (0, 0)):
         assert unit.send("CaptureAndDetect", Camera=camera, Sram=sram) == 0
@@ -54,7 +54,7 @@ def test_jobs_are_done_in_their_order(unit: Harness) -> None:
     assert stores == [*linked_from_sun, *linked_from_nadir, (0, 0, "NADEN"), (0, 0, "SUNEN")]
 
 
-def test_a_program_reset_starts_anew(unit: Harness) -> None:
+def test_program_reset_restores_defaults_and_power_cycles_memories(unit: Harness) -> None:
     unit.scenes[codes.Camera.NADIR] = earth(5, 5)
     unit.command("DetectionThreshold2", Threshold=99)
     unit.command("CaptureAndDetect", Camera=codes.Camera.NADIR, Sram=codes.Sram.SRAM2)
@@ -72,7 +72,9 @@ def test_a_program_reset_starts_anew(unit: Harness) -> None:
 
 
 @pytest.mark.parametrize("stuck", [False, True])
-def test_a_reset_lets_the_acknowledge_out_but_not_for_ever(unit: Harness, stuck: bool) -> None:
+def test_reset_waits_a_limited_time_for_the_acknowledge_to_be_sent(
+    unit: Harness, stuck: bool
+) -> None:
     reset_us: list[int] = []
     start_us = unit.now_us
     unit.backlog = 5
@@ -90,7 +92,7 @@ def test_a_reset_lets_the_acknowledge_out_but_not_for_ever(unit: Harness, stuck:
     assert waited_us == pytest.approx(DRAIN_US if stuck else 4_500, abs=2_000)
 
 
-def test_two_runs_are_identical(unit: Harness) -> None:
+def test_measurement_repeats_identically_after_a_reset(unit: Harness) -> None:
     unit.scenes[codes.Camera.NADIR] = earth(-8, 3)
     results = []
     for _ in range(2):
@@ -137,7 +139,9 @@ def test_memories_are_monitored_in_every_wait(unit: Harness, target: codes.Reset
 
 
 @pytest.mark.parametrize("cleared_after_us", [20_000, 500_000])
-def test_it_is_off_for_a_while_at_least(unit: Harness, cleared_after_us: int) -> None:
+def test_cleared_memory_stays_off_for_the_minimum_time(
+    unit: Harness, cleared_after_us: int
+) -> None:
     unit.log.clear()
     unit.latched.add(codes.Sram.SRAM2)
     unit.run(until_us=unit.now_us + cleared_after_us)
@@ -148,7 +152,7 @@ def test_it_is_off_for_a_while_at_least(unit: Harness, cleared_after_us: int) ->
     assert on_us - off_us >= OFF_TIME_US
 
 
-def test_two_memories_wait_for_the_one_that_was_cut_last(unit: Harness) -> None:
+def test_each_memory_stays_off_for_its_own_minimum_time(unit: Harness) -> None:
     unit.log.clear()
     for sram in codes.Sram:
         unit.latched.add(sram)
@@ -160,7 +164,7 @@ def test_two_memories_wait_for_the_one_that_was_cut_last(unit: Harness) -> None:
         assert on_us - off_us >= OFF_TIME_US
 
 
-def test_a_lasting_latch_up_is_cut_again(unit: Harness) -> None:
+def test_persistent_latch_up_is_cut_again_after_clearing(unit: Harness) -> None:
     unit.latched.add(codes.Sram.SRAM1)
     unit.latch_on(SetPin(pins.SRAM_POWER[codes.Sram.SRAM1], 1), codes.Sram.SRAM1)
     unit.run(until_us=unit.now_us + 10_000)
@@ -172,7 +176,7 @@ def test_a_lasting_latch_up_is_cut_again(unit: Harness) -> None:
     assert over_current(unit) == {codes.Sram.SRAM1}
 
 
-def test_clearing_does_not_touch_a_memory_that_works(unit: Harness) -> None:
+def test_clear_over_current_does_not_touch_a_working_memory(unit: Harness) -> None:
     unit.command("CaptureOnly", Camera=codes.Camera.SUN, Sram=codes.Sram.SRAM1)
     kept = unit.memories[codes.Sram.SRAM1].copy()
     unit.log.clear()
@@ -184,13 +188,15 @@ def test_clearing_does_not_touch_a_memory_that_works(unit: Harness) -> None:
 
 
 @pytest.mark.parametrize(("ma", "cut"), [(OVER_CURRENT_MA - 1, False), (OVER_CURRENT_MA + 1, True)])
-def test_over_current_limit(unit: Harness, ma: float, cut: bool) -> None:
+def test_memory_is_cut_off_above_the_over_current_limit(
+    unit: Harness, ma: float, cut: bool
+) -> None:
     unit.memory_ma = ma
     unit.run(until_us=unit.now_us + 10_000)
     assert unit.cut() == (set(codes.Sram) if cut else set())
 
 
-def test_currents_are_shown_to_a_tenth_within_the_converters_step(unit: Harness) -> None:
+def test_telemetry_currents_are_right_within_one_adc_step(unit: Harness) -> None:
     power = unit.telemetry("Power")
     for monitor in pins.Monitor:
         ma = power[f"Current{monitor.replace('SRAM', 'Sram')}"]
@@ -223,7 +229,7 @@ def test_jobs_come_in_order_and_before_streams() -> None:
         queue.pop()
 
 
-def test_a_stream_may_go_on_before_another() -> None:
+def test_background_job_with_next_turn_runs_before_others() -> None:
     queue = JobQueue()
     one, two = Background(nothing), Background(nothing)
     queue.request(one)
@@ -231,7 +237,7 @@ def test_a_stream_may_go_on_before_another() -> None:
     assert [queue.pop(), queue.pop()] == [two, one]
 
 
-def test_four_jobs_wait_and_streams_do_not_count() -> None:
+def test_queue_holds_four_jobs_besides_background_streams() -> None:
     queue = JobQueue()
     queue.request(Background(nothing))
     accepted = [queue.put(measure(number)) for number in range(QUEUE_DEPTH + 1)]
@@ -249,13 +255,13 @@ def sizes() -> dict[str, int]:
 
 
 @pytest.mark.parametrize("profile", PROFILES)
-def test_everything_fits_and_flash_has_room_for_a_program(profile: Profile) -> None:
+def test_memory_budget_fits_the_pic_and_leaves_flash_for_a_program(profile: Profile) -> None:
     total = used(budget(CubeSenseSwitches.of(profile)))
     assert total[Memory.RAM] <= CAPACITY[Memory.RAM] == 1536
     assert total[Memory.FLASH] < CAPACITY[Memory.FLASH] / 8
 
 
-def test_sizes_follow_from_what_is_kept() -> None:
+def test_memory_budget_sizes_follow_from_the_stored_data() -> None:
     size = sizes()
     assert size["scanned pixels"] == 64
     assert size["edges"] == 4 * MAX_EDGES
@@ -264,7 +270,7 @@ def test_sizes_follow_from_what_is_kept() -> None:
     assert len(size) == len(budget(EXTENDED))
 
 
-def test_the_published_program_takes_less_ram_and_its_table_needs_flash() -> None:
+def test_published_profile_takes_less_ram_and_the_same_flash() -> None:
     ours, printed = (used(budget(CubeSenseSwitches.of(profile))) for profile in PROFILES[::-1])
     assert ours[Memory.FLASH] == printed[Memory.FLASH]  # telecommands change the kind of table
     # The 3 x 3 matrix, two rows of its inverse and its right side, in place of the sums of chords;
@@ -282,7 +288,7 @@ def test_overlaid_buffers_fit_their_shared_memory(profile: Profile) -> None:
 
 
 @pytest.mark.parametrize("profile", ["extended"])
-def test_the_programs_buffers_are_as_large_as_the_budget_says(unit: Harness) -> None:
+def test_program_buffers_have_the_budgeted_sizes(unit: Harness) -> None:
     size = sizes()
     acquisition = unit.program.acquisition
     scanned, window = acquisition.buffers
@@ -298,7 +304,7 @@ def test_the_programs_buffers_are_as_large_as_the_budget_says(unit: Harness) -> 
     assert lines.edges.points.nbytes == size["edges"]
 
 
-def test_the_report_lists_every_buffer_and_the_sums() -> None:
+def test_memory_report_lists_every_buffer_and_the_sums() -> None:
     text = report(budget())
     assert all(buffer.name in text for buffer in budget())
     assert f"**{used(budget())[Memory.RAM]}**" in text

@@ -161,18 +161,18 @@ def test_every_field_shows_its_source(node: Links, name: str) -> None:
     assert expected.keys() == {field.name for field in INTERFACE.telemetry(name).fields}
 
 
-def test_every_frame_is_expected() -> None:
+def test_every_telemetry_frame_has_an_expected_value() -> None:
     assert EXPECTED.keys() == {message.name for message in INTERFACE.telemetries}
 
 
 @pytest.mark.parametrize("flag", FLAGS)
-def test_each_flag_is_shown_alone(node: Links, flag: str) -> None:
+def test_communication_status_shows_each_flag_separately(node: Links, flag: str) -> None:
     node.state.flags.add(flag)
     values = node.telemetry("CommunicationStatus")
     assert {name for name, value in values.items() if value and "Count" not in name} == {flag}
 
 
-def test_after_start_up(node: Links) -> None:
+def test_telemetry_after_start_up_has_its_initial_values(node: Links) -> None:
     assert [len(result.edges) for result in node.state.results.values()] == [0, 0]
     for number in (1, 2):
         values = node.telemetry(f"Result{number}")

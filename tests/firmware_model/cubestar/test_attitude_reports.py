@@ -21,7 +21,9 @@ def solved(unit: Harness, true: Rotation) -> Harness:
     return unit
 
 
-def test_the_quaternion_in_both_precisions(solved: Harness, true: Rotation) -> None:
+def test_attitude_telemetry_has_the_quaternion_in_both_precisions(
+    solved: Harness, true: Rotation
+) -> None:
     exact = solved.telemetry("AttitudeQuaternion")
     assert error_deg(attitude_of(exact), true) < 0.01
     for frame in ("Quaternion", "AttitudeData"):
@@ -30,7 +32,7 @@ def test_the_quaternion_in_both_precisions(solved: Harness, true: Rotation) -> N
             assert printed[f"Qbar{index}"] == pytest.approx(exact[f"Q{index}"], abs=0.51e-4)
 
 
-def test_the_boresight(solved: Harness, true: Rotation) -> None:
+def test_boresight_telemetry_matches_the_attitude(solved: Harness, true: Rotation) -> None:
     x, y, z = true.inv().apply([0, 0, 1])
     values = solved.telemetry("AttitudeData")
     assert [values[f"BSV{axis}"] for axis in "XYZ"] == pytest.approx([x, y, z], abs=3e-4)
@@ -42,7 +44,7 @@ def test_the_boresight(solved: Harness, true: Rotation) -> None:
     assert printed == pytest.approx(angles, abs=0.51e-4)
 
 
-def test_before_the_first_attitude(unit: Harness) -> None:
+def test_attitude_telemetry_before_the_first_fix_is_the_identity(unit: Harness) -> None:
     values = unit.telemetry("AttitudeQuaternion")
     assert values == {
         **{"Q0": 0, "Q1": 0, "Q2": 0, "Q3": 1},
@@ -101,7 +103,7 @@ def test_performance_counts_the_stage_reached(lit: Harness) -> None:
     assert outcome(lit) == set()
 
 
-def test_processing_that_takes_too_long(unit: Harness) -> None:
+def test_processing_above_500_ms_raises_processing_time_error(unit: Harness) -> None:
     latest_ms = unit.program.commands.processing.latest_ms
     for detection_ms, too_long in ((400.0, set()), (401.0, {"ProcessingTimeError"})):
         latest_ms |= {"detection": detection_ms, "identification": 60.0, "attitude": 40.0}

@@ -15,7 +15,7 @@ ENABLE = MODE_SELECT + b"\x21"
 DISABLE = MODE_SELECT + b"\x20"
 
 
-def test_the_order_of_a_capture(unit: Harness) -> None:
+def test_capture_requests_have_the_documented_order(unit: Harness) -> None:
     unit.command("CaptureImage")  # sets the camera up
     unit.log.clear()
     unit.command("CaptureImage")
@@ -40,7 +40,9 @@ def test_the_order_of_a_capture(unit: Harness) -> None:
 
 
 @pytest.mark.parametrize("delay_ms", [0, 70, 1000])
-def test_the_first_frame_is_left_to_pass(unit: Harness, delay_ms: int) -> None:
+def test_capture_waits_the_discard_delay_after_enabling_the_camera(
+    unit: Harness, delay_ms: int
+) -> None:
     unit.command("SetDiscardDelay", Delay=delay_ms)
     unit.command("CaptureImage")
     at = {request: now_us for now_us, request in unit.log if not isinstance(request, StrobeRead)}
@@ -49,7 +51,7 @@ def test_the_first_frame_is_left_to_pass(unit: Harness, delay_ms: int) -> None:
     assert stored_us - enabled_us == pytest.approx(1000 * delay_ms, abs=20)
 
 
-def test_the_bank_is_chosen_before_storing_and_kept_for_the_transfer(unit: Harness) -> None:
+def test_bank_pin_is_set_before_the_store_and_kept_for_the_transfer(unit: Harness) -> None:
     unit.command("SelectImageBank", Bank=1)
     unit.log.clear()
     unit.command("CaptureImage")
@@ -66,7 +68,9 @@ def test_the_bank_is_chosen_before_storing_and_kept_for_the_transfer(unit: Harne
         (lambda data: True, "ISSetupError"),
     ],
 )
-def test_a_camera_that_does_not_answer(lit: Harness, refused: object, flag: str) -> None:
+def test_capture_fails_with_a_flag_when_the_camera_refuses_a_write(
+    lit: Harness, refused: object, flag: str
+) -> None:
     assert callable(refused)
     lit.camera_refuses = refused
     lit.command("CaptureImage")
@@ -79,7 +83,7 @@ def test_a_camera_that_does_not_answer(lit: Harness, refused: object, flag: str)
     assert lit.status() is TaskStatus.CALCULATED
 
 
-def test_a_camera_that_can_not_be_disabled_gives_a_good_picture(lit: Harness) -> None:
+def test_frame_is_processed_although_the_camera_refuses_the_disable(lit: Harness) -> None:
     lit.command("CaptureImage")
     lit.camera_refuses = lambda data: data == DISABLE
     lit.command("CaptureAndProcess")
@@ -88,7 +92,7 @@ def test_a_camera_that_can_not_be_disabled_gives_a_good_picture(lit: Harness) ->
 
 
 @pytest.mark.parametrize("failure", ["no frame", "not disabled"])
-def test_a_camera_that_failed_is_set_up_again(unit: Harness, failure: str) -> None:
+def test_failed_camera_is_set_up_again_by_the_next_capture(unit: Harness, failure: str) -> None:
     unit.command("CaptureImage")
     set_up = dict(unit.camera)
     unit.camera.clear()  # it lost its supply
@@ -104,7 +108,7 @@ def test_a_camera_that_failed_is_set_up_again(unit: Harness, failure: str) -> No
     assert unit.camera == set_up
 
 
-def test_a_frame_that_never_comes(lit: Harness) -> None:
+def test_capture_times_out_when_no_frame_arrives(lit: Harness) -> None:
     lit.command("CaptureImage")
     lit.frame_us = None
     lit.log.clear()
@@ -124,7 +128,9 @@ def test_a_frame_that_never_comes(lit: Harness) -> None:
 
 
 @pytest.mark.parametrize(("delay_ms", "frame_us"), [(70, FRAME_US), (1000, 1_900_000)])
-def test_the_times_of_a_capture(unit: Harness, delay_ms: int, frame_us: int) -> None:
+def test_phase_times_of_a_capture_match_delay_frame_and_transfer(
+    unit: Harness, delay_ms: int, frame_us: int
+) -> None:
     unit.frame_us = frame_us
     unit.command("SetDiscardDelay", Delay=delay_ms)
     unit.command("CaptureImage")
@@ -139,7 +145,7 @@ def test_the_times_of_a_capture(unit: Harness, delay_ms: int, frame_us: int) -> 
 
 
 @pytest.mark.parametrize(("rate", "exposure"), [(7, 0), (7, 500), (7, 60_000), (30, 0), (6, 10)])
-def test_a_pictures_time_is_mid_exposure(lit: Harness, rate: int, exposure: int) -> None:
+def test_image_time_is_mid_exposure(lit: Harness, rate: int, exposure: int) -> None:
     lit.command("SetFrameRate", FrameRate=rate)
     lit.command("Exposure", exposure=exposure)
     lit.log.clear()
@@ -154,7 +160,7 @@ def test_a_pictures_time_is_mid_exposure(lit: Harness, rate: int, exposure: int)
     )
 
 
-def test_pictures_are_counted(lit: Harness) -> None:
+def test_frame_counter_counts_test_patterns_uploads_and_captures(lit: Harness) -> None:
     lit.command("CaptureTestPatern", TestPaternType=0)
     lit.command("UploadImage", "CaptureAndProcess")
     assert lit.telemetry("AttitudeQuaternion")["FrameCounter"] == 3

@@ -25,7 +25,7 @@ def angle_between(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
     return math.atan2(float(np.linalg.norm(np.cross(a, b))), float(a @ b))
 
 
-def test_stars_are_those_strictly_brighter_in_the_order_of_their_numbers() -> None:
+def test_catalogue_lists_stars_brighter_than_the_limit_by_number() -> None:
     hip, vectors, v_mag = random_sky(60, 1)
     v_mag[7] = 3.0
     catalogue = StarCatalogue.build(hip, vectors, v_mag, mag_limit=3.0, pair_limit_deg=40)
@@ -36,7 +36,7 @@ def test_stars_are_those_strictly_brighter_in_the_order_of_their_numbers() -> No
     assert np.array_equal(catalogue.v_mag, v_mag[rows])
 
 
-def test_pairs_are_all_those_closer_than_the_limit_in_rising_order() -> None:
+def test_pair_list_has_all_pairs_below_the_limit_in_rising_order() -> None:
     hip, vectors, v_mag = random_sky(60, 2)
     catalogue = StarCatalogue.build(hip, vectors, v_mag, mag_limit=9.0, pair_limit_deg=35)
     ordered = vectors[np.argsort(hip)]
@@ -54,7 +54,7 @@ def test_pairs_are_all_those_closer_than_the_limit_in_rising_order() -> None:
     assert np.all(np.diff(pairs.angle) >= 0)
 
 
-def test_the_order_of_the_source_does_not_change_a_byte() -> None:
+def test_catalogue_bytes_do_not_depend_on_the_source_order() -> None:
     hip, vectors, v_mag = random_sky(80, 3)
     shuffle = np.random.default_rng(4).permutation(80)
     one = StarCatalogue.build(hip, vectors, v_mag, 4.0, 50)
@@ -80,14 +80,14 @@ def test_bytes_hold_the_arrays_in_the_documented_order() -> None:
     assert all(map(np.array_equal, arrays[4:], (listed.first, listed.second, listed.angle)))
 
 
-def test_published_sizes_follow_from_the_published_counts() -> None:
+def test_catalogue_sizes_match_the_published_ones() -> None:
     hip, vectors, v_mag = random_sky(405, 6)
     catalogue = StarCatalogue.build(hip, vectors, v_mag, 9.0, 42.1)
     assert catalogue.star_bytes / 1024 == pytest.approx(5.54, abs=0.005)
     assert catalogue.pair_bytes / len(catalogue.pairs) * 11_484 / 1024 == pytest.approx(89.7, 1e-3)
 
 
-def test_the_fainter_of_two_stars_too_close_to_tell_apart_is_left_out() -> None:
+def test_catalogue_omits_the_fainter_of_two_close_stars() -> None:
     def beside(angle: float) -> NDArray[np.float64]:
         return np.array([math.sin(angle), 0.0, math.cos(angle)])
 
@@ -109,7 +109,7 @@ def test_hipparcos_gives_the_published_lists() -> None:
 
 
 @pytest.mark.parametrize("radius_deg", [5.0, 35.0, 120.0])
-def test_reduced_keeps_what_lies_in_the_cap_and_the_pairs_within_it(radius_deg: float) -> None:
+def test_reduced_catalogue_keeps_stars_and_pairs_within_the_cap(radius_deg: float) -> None:
     hip, vectors, v_mag = random_sky(300, 7)
     catalogue = StarCatalogue.build(hip, vectors, v_mag, 9.0, 50)
     boresight = np.array([0.6, -0.48, 0.64])
@@ -126,7 +126,7 @@ def test_reduced_keeps_what_lies_in_the_cap_and_the_pairs_within_it(radius_deg: 
     assert np.all(np.diff(pairs.angle) >= 0)
 
 
-def test_reduced_charges_one_pass_over_each_list_and_the_copies() -> None:
+def test_reduced_catalogue_charges_one_pass_and_its_copies() -> None:
     catalogue = StarCatalogue.build(*random_sky(300, 8), mag_limit=9.0, pair_limit_deg=50)
     boresight = np.array([0, 0, 1], dtype=np.float32)
     narrow, wide = meter(), meter()
@@ -156,7 +156,7 @@ def test_rejects_impossible_catalogues(change: dict[str, object], message: str) 
 
 
 @pytest.mark.parametrize("limit_deg", [10.0, 42.1, 50.0, 57.3])
-def test_a_narrower_list_is_the_beginning_of_a_wider_one(limit_deg: float) -> None:
+def test_narrower_pair_list_equals_the_start_of_a_wider_one(limit_deg: float) -> None:
     wide, narrow = (
         StarCatalogue.build(*random_sky(200, 9), mag_limit=9.0, pair_limit_deg=limit)
         for limit in (50.0, min(limit_deg, 50.0))

@@ -27,7 +27,7 @@ def test_telecommands_are_executed_in_order(unit: Harness) -> None:
     unit.shown("Exposure", exposure=4)
 
 
-def test_processed_says_when_the_last_telecommand_is_done(unit: Harness) -> None:
+def test_processed_flag_is_set_when_the_last_telecommand_is_done(unit: Harness) -> None:
     unit.shown("TcmdProcessed", Processed=1)
     unit.send("CaptureImage")
     unit.send("Exposure", exposure=1)
@@ -39,7 +39,9 @@ def test_processed_says_when_the_last_telecommand_is_done(unit: Harness) -> None
 
 
 @pytest.mark.parametrize("name", ["Reset", "MCUReset"])
-def test_a_telecommand_that_resets_is_not_processed_before_it(unit: Harness, name: str) -> None:
+def test_resetting_telecommand_is_not_marked_processed_before_the_reset(
+    unit: Harness, name: str
+) -> None:
     seen: dict[int, set[int]] = {0: set(), 1: set()}
     unit.on_request = lambda _request: seen[len(unit.resets)].add(
         unit.telemetry("TcmdProcessed")["Processed"]
@@ -49,13 +51,13 @@ def test_a_telecommand_that_resets_is_not_processed_before_it(unit: Harness, nam
 
 
 @pytest.mark.parametrize("name", ["Reset", "MCUReset", "TestWDG"])
-def test_a_reset_drops_the_telecommands_that_wait(unit: Harness, name: str) -> None:
+def test_reset_drops_waiting_telecommands(unit: Harness, name: str) -> None:
     unit.send(name)
     unit.command("Exposure", exposure=9)
     unit.shown("Exposure", exposure=0)
 
 
-def test_the_stream_waits_for_the_uart(unit: Harness) -> None:
+def test_image_stream_waits_for_the_uart_backlog(unit: Harness) -> None:
     unit.command("UploadImage")
     unit.backlog = STREAM_BACKLOG_BYTES + 1
     start_us = unit.now_us
@@ -68,7 +70,7 @@ def test_the_stream_waits_for_the_uart(unit: Harness) -> None:
 
 
 @pytest.mark.parametrize("name", ["TestWDG", "CaptureImage"])
-def test_an_interrupt_does_not_cut_a_wait_short(unit: Harness, name: str) -> None:
+def test_interrupt_does_not_shorten_a_wait(unit: Harness, name: str) -> None:
     sleeps = []
     unit.on_request = lambda request: sleeps.append(request) if isinstance(request, Sleep) else None
     unit.send(name)
@@ -77,7 +79,7 @@ def test_an_interrupt_does_not_cut_a_wait_short(unit: Harness, name: str) -> Non
     assert not sleeps[0].wakeable
 
 
-def test_streaming_pays_for_each_pixel(unit: Harness) -> None:
+def test_image_streaming_is_charged_per_pixel(unit: Harness) -> None:
     """A turn of the loop and a bus cycle for each of 1024 x 512 pixels."""
     unit.command("UploadImage")
     before = unit.meter.counts.copy()
@@ -91,7 +93,7 @@ def reset_settings() -> Settings:
     return Settings(INTERFACE, SETTING_COMMANDS)
 
 
-def test_the_reset_values_are_the_published_ones() -> None:
+def test_reset_values_are_the_published_ones() -> None:
     assert detection_config(reset_settings()) == DetectionConfig()
     # Figure 5.12, coefficients with inverted sign, and the focal length of section 5.4.
     published = CameraParameters(
@@ -100,7 +102,7 @@ def test_the_reset_values_are_the_published_ones() -> None:
     assert vars(camera_parameters(reset_settings())) == pytest.approx(vars(published), rel=1e-6)
 
 
-def test_every_setting_has_its_place() -> None:
+def test_stored_settings_reach_the_processing_configuration() -> None:
     settings = reset_settings()
     region = {"StepSize": 4, "Xstart": 10, "Xend": 20, "Ystart": 30, "Yend": 40}
     settings.put("setDetectionRegion", region)
@@ -133,7 +135,7 @@ def test_every_setting_has_its_place() -> None:
 
 
 @pytest.mark.parametrize(("cx", "cy"), [(539.0, 175.5), (512.0, 256.0), (100.0, 500.0)])
-def test_the_field_reaches_to_the_farthest_corner(cx: float, cy: float) -> None:
+def test_field_cosine_reaches_to_the_farthest_corner(cx: float, cy: float) -> None:
     settings = reset_settings()
     settings.put("setPrincipalPoint", {"Cx": cx, "Cy": cy})
     x, y = np.meshgrid([0, 1024], [0, 512])
@@ -142,7 +144,7 @@ def test_the_field_reaches_to_the_farthest_corner(cx: float, cy: float) -> None:
     assert field_cosine(camera_parameters(settings)) == pytest.approx(expected, rel=2e-7)
 
 
-def test_settings_that_the_hardware_can_not_follow_act_as_the_nearest() -> None:
+def test_unsupported_settings_are_clamped_to_the_nearest_supported() -> None:
     settings = Settings(INTERFACE, SETTING_COMMANDS)
     wide = {"GridSize": 4, "MaxStars": 99, "MaxInvalidStars": 50, "MaxNoise": 13}
     settings.put("setDetectionVariables", wide)
@@ -158,7 +160,7 @@ EXPOSURE = INTERFACE.telecommand("Exposure")
 GOOD = bytes([EXPOSURE.id]) + EXPOSURE.pack(exposure=5)
 
 
-def test_counters_count_what_was_accepted_and_answered(unit: Harness) -> None:
+def test_counters_count_accepted_telecommands_and_answered_telemetry(unit: Harness) -> None:
     unit.uart(encode_frame(GOOD) + encode_frame(b"\x63") + encode_frame(b"\xfe"))
     unit.i2c_write(GOOD)
     unit.telemetry("IDMargin")
@@ -167,7 +169,7 @@ def test_counters_count_what_was_accepted_and_answered(unit: Harness) -> None:
     assert unit.telemetry("ExtendedIdentification")["TlmCount"] == 2
 
 
-def test_idle_means_that_a_reset_would_cut_nothing_short(unit: Harness) -> None:
+def test_link_is_idle_only_between_frames_and_transfers(unit: Harness) -> None:
     link = unit.program.link
     assert link.idle
     link.uart_byte(0x1F)
@@ -187,7 +189,7 @@ def test_idle_means_that_a_reset_would_cut_nothing_short(unit: Harness) -> None:
     assert link.idle
 
 
-def test_two_reads_of_one_transfer_go_on(unit: Harness) -> None:
+def test_second_read_of_one_i2c_transfer_continues_the_answer(unit: Harness) -> None:
     link = unit.program.link
     link.i2c_start(False)
     link.i2c_write(128)
@@ -238,11 +240,11 @@ STEPS: list[Step] = [
 
 
 @pytest.mark.parametrize("profile", ["published", "extended"])
-def test_session(lit: Harness, profile: str) -> None:
+def test_cubestar_session_matches_its_recording(lit: Harness, profile: str) -> None:
     as_recorded(lit, f"CubeStar session, {profile}", STEPS)
 
 
 @pytest.mark.parametrize("profile", ["published", "extended"])
-def test_loop(lit: Harness, profile: str) -> None:
+def test_cubestar_loop_matches_its_recording(lit: Harness, profile: str) -> None:
     lit.start_loop(5.5)
     as_recorded(lit, f"CubeStar loop, {profile}", [])

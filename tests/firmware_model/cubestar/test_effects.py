@@ -16,7 +16,7 @@ EFFECTS: dict[str, object] = {}
 telecommand = registered_in(EFFECTS)  #: Decorator: the test shows what the named telecommands do
 
 
-def test_every_telecommand_has_an_effect_and_no_other_does(unit: Harness) -> None:
+def test_telecommands_handled_tested_and_declared_are_the_same(unit: Harness) -> None:
     declared = {message.name for message in cubestar.INTERFACE.telecommands}
     assert unit.program.commands.handled == EFFECTS.keys() == declared
 
@@ -44,7 +44,7 @@ def first_vector(unit: Harness, sky: Sky) -> np.ndarray:
 
 
 @telecommand("TogglePowerSW")
-def test_toggle_power_sw(unit: Harness) -> None:
+def test_toggle_power_sw_switches_the_imager(unit: Harness) -> None:
     unit.command("TogglePowerSW")
     assert unit.switches == {"memory": True, "imager": False}
     assert unit.telemetry("PowerStatus")["Status"] == 0
@@ -56,7 +56,7 @@ def test_toggle_power_sw(unit: Harness) -> None:
 
 
 @telecommand("Reset")
-def test_reset(unit: Harness) -> None:
+def test_reset_restores_saved_settings(unit: Harness) -> None:
     unit.command("Exposure", exposure=7)
     unit.command("SaveConfig")
     unit.command("Exposure", exposure=9)
@@ -73,7 +73,7 @@ def test_reset(unit: Harness) -> None:
 
 
 @telecommand("MCUReset")
-def test_mcu_reset(unit: Harness) -> None:
+def test_mcu_reset_keeps_settings_and_counts_the_cause(unit: Harness) -> None:
     unit.command("Exposure", exposure=9)
     unit.command("TestSRAM", "MCUReset")
     assert unit.resets == [cubestar.ResetCause.SYSTEM_REQUEST]
@@ -84,7 +84,7 @@ def test_mcu_reset(unit: Harness) -> None:
 
 
 @telecommand("setDelayTimerTimeout")
-def test_set_delay_timer_timeout(unit: Harness) -> None:
+def test_set_delay_timer_timeout_delays_the_loop(unit: Harness) -> None:
     unit.command("setDelayTimerTimeout", Time=40)
     unit.shown("DelayTime", Timeout=40)
     start_us = unit.now_us
@@ -95,7 +95,7 @@ def test_set_delay_timer_timeout(unit: Harness) -> None:
 
 
 @telecommand("ClearErrorFlags")
-def test_clear_error_flags(unit: Harness) -> None:
+def test_clear_error_flags_telecommand_clears_all_flags(unit: Harness) -> None:
     assert unit.flags() == set()
     unit.command("IDStars")
     unit.uart(b"noise")
@@ -105,7 +105,7 @@ def test_clear_error_flags(unit: Harness) -> None:
 
 
 @telecommand("SaveConfig", "ReadConfig", "ClearConfig")
-def test_configuration(unit: Harness) -> None:
+def test_configuration_is_saved_read_and_cleared(unit: Harness) -> None:
     unit.command("Exposure", exposure=5)
     unit.command("setPrincipalPoint", Cx=1.5, Cy=2.5)
     unit.command("SaveConfig")
@@ -124,7 +124,7 @@ def test_configuration(unit: Harness) -> None:
 
 
 @telecommand("TestSRAM")
-def test_sram(unit: Harness) -> None:
+def test_sram_test_telecommand_reports_passed_or_failed(unit: Harness) -> None:
     unit.shown("SRAMTestResults", TestResult=cubestar.MemoryTest.NOT_RUN)
     unit.command("CaptureImage", "TestSRAM")
     unit.shown("SRAMTestResults", TestResult=cubestar.MemoryTest.PASSED)
@@ -141,7 +141,7 @@ def test_sram(unit: Harness) -> None:
 
 
 @telecommand("TestWDG", "ClearWDGResetCounter")
-def test_watchdog(unit: Harness) -> None:
+def test_watchdog_test_resets_after_its_period_and_counts(unit: Harness) -> None:
     unit.command("Exposure", exposure=9)
     start_us = unit.now_us
     unit.send("TestWDG")
@@ -163,7 +163,7 @@ def test_watchdog(unit: Harness) -> None:
 
 
 @telecommand("Trigger", "StopLoop")
-def test_loop(unit: Harness) -> None:
+def test_trigger_starts_and_stop_loop_ends_the_loop(unit: Harness) -> None:
     unit.start_loop(3.9)
     values = unit.telemetry("LoopStatus")
     assert (values["Running"], values["Iterations"]) == (True, 4)
@@ -178,7 +178,7 @@ def test_loop(unit: Harness) -> None:
 
 
 @telecommand("Exposure", "SetFrameRate", "SetDiscardDelay", "SelectImageBank")
-def test_camera_settings(unit: Harness) -> None:
+def test_camera_setting_telecommands_take_effect(unit: Harness) -> None:
     unit.command("Exposure", exposure=1000)
     unit.command("SetFrameRate", FrameRate=30)
     unit.command("SetDiscardDelay", Delay=20)
@@ -197,7 +197,7 @@ def test_camera_settings(unit: Harness) -> None:
 
 
 @telecommand("WriteTo_IS_Register", "ReadFrom_IS_Register", "SetCameraRegisterPage")
-def test_paged_registers(unit: Harness) -> None:
+def test_paged_camera_register_telecommands_work(unit: Harness) -> None:
     unit.shown("IS_Register", DataH=0, DataL=0)
     unit.command("WriteTo_IS_Register", Reg=0x26, DataH=0, DataL=0x77)
     assert unit.camera == {0x8526: 0x77}
@@ -210,7 +210,7 @@ def test_paged_registers(unit: Harness) -> None:
 
 
 @telecommand("WriteCameraRegister", "SelectCameraRegister")
-def test_registers(unit: Harness) -> None:
+def test_camera_register_telecommands_write_and_read(unit: Harness) -> None:
     unit.shown("CameraRegister", Address=0, Value=0, Valid=0)
     unit.command("WriteCameraRegister", Address=0x840B, Value=3)
     assert unit.camera == {0x840B: 3}
@@ -225,7 +225,7 @@ def test_registers(unit: Harness) -> None:
 
 
 @telecommand("setFocalLength")
-def test_set_focal_length(unit: Harness, sky: Sky) -> None:
+def test_set_focal_length_scales_the_body_vectors(unit: Harness, sky: Sky) -> None:
     before = first_vector(unit, sky)
     unit.command("setFocalLength", FocalLength=7.0)
     unit.shown("FocalLengthDetails", FocalLength=7.0, Fx=1147.5, Fy=1147.4)
@@ -234,7 +234,9 @@ def test_set_focal_length(unit: Harness, sky: Sky) -> None:
 
 
 @telecommand("setFocalLengthComponents")
-def test_set_focal_length_components(unit: Harness, sky: Sky) -> None:
+def test_set_focal_length_components_changes_the_corrected_position(
+    unit: Harness, sky: Sky
+) -> None:
     before = first(unit, sky, *POINT)
     unit.command("setFocalLengthComponents", Fx=2000.0, Fy=2100.0)
     unit.shown("FocalLengthDetails", FocalLength=6.28, Fx=2000.0, Fy=2100.0)
@@ -242,7 +244,7 @@ def test_set_focal_length_components(unit: Harness, sky: Sky) -> None:
 
 
 @telecommand("setPrincipalPoint")
-def test_set_principal_point(unit: Harness, sky: Sky) -> None:
+def test_set_principal_point_shifts_the_body_vectors(unit: Harness, sky: Sky) -> None:
     before = first_vector(unit, sky)
     unit.command("setPrincipalPoint", Cx=512.0, Cy=256.0)
     unit.shown("PrincipalPoint", Cx=512.0, Cy=256.0)
@@ -252,7 +254,7 @@ def test_set_principal_point(unit: Harness, sky: Sky) -> None:
 
 
 @telecommand("setRadialDistortionGains", "setTangentalDistortionGains")
-def test_distortion_gains(unit: Harness, sky: Sky) -> None:
+def test_distortion_telecommands_change_the_corrected_position(unit: Harness, sky: Sky) -> None:
     unit.command("setTangentalDistortionGains", P1=0.5, P2=-0.25)
     unit.shown("DistortionCoef", K1=0.32358, K2=-0.12456, P1=0.5, P2=-0.25)
     assert first(unit, sky, *POINT) != pytest.approx(first(unit, sky, *CENTROID), abs=5)
@@ -263,7 +265,7 @@ def test_distortion_gains(unit: Harness, sky: Sky) -> None:
 
 
 @telecommand("CaptureTestPatern")
-def test_capture_test_patern(unit: Harness) -> None:
+def test_capture_test_pattern_stores_each_pattern(unit: Harness) -> None:
     y, x = np.mgrid[:512, :1024]
     for pattern, expected in (
         (cubestar.TestPattern.MOVING, x),
@@ -279,7 +281,7 @@ def test_capture_test_patern(unit: Harness) -> None:
 
 
 @telecommand("CaptureImage")
-def test_capture_image(unit: Harness, sky: Sky) -> None:
+def test_capture_image_stores_the_frame(unit: Harness, sky: Sky) -> None:
     unit.picture = sky.picture
     unit.command("CaptureImage")
     assert np.array_equal(image(unit), sky.picture)
@@ -288,7 +290,7 @@ def test_capture_image(unit: Harness, sky: Sky) -> None:
 
 
 @telecommand("UploadImage", "UploadBlock")
-def test_upload(unit: Harness, sky: Sky) -> None:
+def test_upload_telecommands_store_the_image(unit: Harness, sky: Sky) -> None:
     unit.command("UploadBlock", BlockNumber=3, Data=b"\x55" * 128)
     unit.command("UploadImage")
     assert not image(unit).any()
@@ -305,7 +307,7 @@ def test_upload(unit: Harness, sky: Sky) -> None:
 
 
 @telecommand("ImageBlockSet")
-def test_image_block_set(unit: Harness) -> None:
+def test_image_block_set_selects_block_and_size(unit: Harness) -> None:
     unit.command("CaptureTestPatern", TestPaternType=cubestar.TestPattern.RAMPING)
     for size, length in enumerate((32, 64, 128)):
         unit.command("ImageBlockSet", BlockNumber=5, BlockSize=size)
@@ -321,7 +323,7 @@ def test_image_block_set(unit: Harness) -> None:
 
 
 @telecommand("StreamDownImage")
-def test_stream_down_image(unit: Harness, sky: Sky) -> None:
+def test_stream_down_image_sends_all_blocks(unit: Harness, sky: Sky) -> None:
     unit.picture = sky.picture
     unit.command("CaptureImage", "StreamDownImage")
     frames = unit.received()
@@ -333,7 +335,7 @@ def test_stream_down_image(unit: Harness, sky: Sky) -> None:
 
 
 @telecommand("setDetectionRegion")
-def test_set_detection_region(unit: Harness, sky: Sky) -> None:
+def test_set_detection_region_limits_the_search(unit: Harness, sky: Sky) -> None:
     region = {"StepSize": 2, "Xstart": 100, "Xend": 600, "Ystart": 50, "Yend": 400}
     unit.command("setDetectionRegion", **region)
     unit.shown("DetectionRegion", **region)
@@ -344,7 +346,7 @@ def test_set_detection_region(unit: Harness, sky: Sky) -> None:
 
 
 @telecommand("setDetectionThresholds")
-def test_set_detection_thresholds(unit: Harness, sky: Sky) -> None:
+def test_set_detection_thresholds_changes_the_detected_stars(unit: Harness, sky: Sky) -> None:
     unit.command("setDetectionThresholds", DetectionThreshold=200, StarThreshold=9)
     values = unit.telemetry("DetectionThresholdValues")
     assert (values["DetectionThreshold"], values["StarThreshold"]) == (200, 9)
@@ -353,7 +355,7 @@ def test_set_detection_thresholds(unit: Harness, sky: Sky) -> None:
 
 
 @telecommand("setStarPixels")
-def test_set_star_pixels(unit: Harness, sky: Sky) -> None:
+def test_set_star_pixels_limits_the_star_size(unit: Harness, sky: Sky) -> None:
     unit.command("setStarPixels", MinPixels=99, MaxPixels=100)
     unit.shown("StarPixels", MinPixels=99, MaxPixels=100)
     first(unit, sky)
@@ -365,7 +367,7 @@ def test_set_star_pixels(unit: Harness, sky: Sky) -> None:
 
 
 @telecommand("setDetectionVariables")
-def test_set_detection_variables(unit: Harness, sky: Sky) -> None:
+def test_set_detection_variables_limits_the_star_count(unit: Harness, sky: Sky) -> None:
     limits = {"GridSize": 3, "MaxStars": 4, "MaxInvalidStars": 5, "MaxNoise": 6}
     unit.command("setDetectionVariables", **limits)
     unit.shown("StarGrid", GridSize=3)
@@ -375,7 +377,7 @@ def test_set_detection_variables(unit: Harness, sky: Sky) -> None:
 
 
 @telecommand("setIDMode")
-def test_set_id_mode(unit: Harness) -> None:
+def test_set_id_mode_changes_the_shown_mode(unit: Harness) -> None:
     for mode in (0, 1):
         unit.command("setIDMode", IdMode=mode)
         unit.shown("IDMode", Mode=mode)
@@ -383,7 +385,7 @@ def test_set_id_mode(unit: Harness) -> None:
 
 
 @telecommand("SetProfile", "SetSwitch")
-def test_switches(unit: Harness, sky: Sky) -> None:
+def test_profile_and_switch_telecommands_take_effect_at_once(unit: Harness, sky: Sky) -> None:
     """They count at once, and a page is paid for from then on."""
     unit.picture = sky.picture
     unit.command("SetProfile", Profile="published")
@@ -403,14 +405,14 @@ def test_switches(unit: Harness, sky: Sky) -> None:
 
 
 @telecommand("setTrackingMode")
-def test_set_tracking_mode(unit: Harness) -> None:
+def test_set_tracking_mode_selects_assisted_mode(unit: Harness) -> None:
     unit.command("setTrackingMode", RightAscension=1.0, Declination=-0.5)
     assert unit.telemetry("LoopStatus")["ModeFlag"] == cubestar.MatchMode.ASSISTED
 
 
 @pytest.mark.parametrize("profile", ["extended"])  # as printed, stars without votes have names
 @telecommand("setIDMargin")
-def test_set_id_margin(unit: Harness, sky: Sky) -> None:
+def test_set_id_margin_makes_wrong_positions_fail(unit: Harness, sky: Sky) -> None:
     unit.command("setIDMargin", Margin=0.0001)
     unit.shown("IDMargin", Margin=0.0001)
     unit.command("setRadialDistortionGains", K1=-0.3, K2=-0.12456)  # places are wrong by pixels
@@ -420,7 +422,7 @@ def test_set_id_margin(unit: Harness, sky: Sky) -> None:
 
 
 @telecommand("DetectStars", "IDStars", "SelectBestStars", "EstimateAttitude")
-def test_steps(unit: Harness, sky: Sky) -> None:
+def test_processing_step_telecommands_run_one_step_each(unit: Harness, sky: Sky) -> None:
     first(unit, sky)
     assert unit.status() is TaskStatus.DETECTED
     assert unit.telemetry("DetectionSummary")["NumStarsDetected"] == len(sky.stars)
@@ -443,7 +445,7 @@ def test_steps(unit: Harness, sky: Sky) -> None:
 
 
 @telecommand("CaptureAndProcess", "ProcessImage")
-def test_capture_and_process(unit: Harness, sky: Sky) -> None:
+def test_capture_and_process_yields_an_attitude(unit: Harness, sky: Sky) -> None:
     unit.picture = sky.picture
     unit.command("CaptureAndProcess")
     assert unit.status() is TaskStatus.CALCULATED

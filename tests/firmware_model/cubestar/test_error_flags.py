@@ -86,7 +86,9 @@ def test_every_flag_is_raised_by_its_cause(name: str, unit: Harness, sky: Sky) -
     SETTERS,
     ids=[f"{message.name}-{field.name}" for message, field in SETTERS],
 )
-def test_a_parameter_out_of_range(unit: Harness, message: Message, field: Field) -> None:
+def test_parameter_out_of_range_is_refused_and_sets_its_flag(
+    unit: Harness, message: Message, field: Field
+) -> None:
     bad = next(
         value
         for value in (0, 4, 255, 65535, -1e9)
@@ -98,7 +100,7 @@ def test_a_parameter_out_of_range(unit: Harness, message: Message, field: Field)
     assert not unit.program.link.queue
 
 
-def test_flags_that_this_hardware_can_not_raise() -> None:
+def test_flags_without_a_cause_are_declared_as_never_raised() -> None:
     assert NEVER_RAISED.keys() == {
         "SPICommsError",  # no SPI bus
         "FlashInvalidAreaError",  # pages have fixed, aligned places, and are written whole
@@ -174,7 +176,7 @@ def look_where_the_catalogue_has_no_stars(
 
 
 @pytest.mark.parametrize("profile", ["extended"])
-def test_lost_in_space_blames_no_catalogue(unit: Harness) -> None:
+def test_lost_in_space_failure_does_not_raise_a_catalogue_flag(unit: Harness) -> None:
     south = take(unit.catalogue, Rotation.from_euler("x", 180, degrees=True))
     look_where_the_catalogue_has_no_stars(unit, south, -1.2, IdMode.LOST_IN_SPACE)
     assert unit.flags() == {"IDError"}

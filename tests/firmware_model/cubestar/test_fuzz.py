@@ -29,7 +29,7 @@ def stays_sane(unit: Harness) -> None:
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_random_bytes_on_the_uart(lit: Harness, seed: int) -> None:
+def test_random_uart_bytes_do_not_harm_the_node(lit: Harness, seed: int) -> None:
     rng = np.random.default_rng(seed)
     data = rng.integers(0, 256, UART_BYTES, dtype=np.uint8)
     # As likely as any other byte in one half of the noise, every third byte in the other.
@@ -44,7 +44,7 @@ def test_random_bytes_on_the_uart(lit: Harness, seed: int) -> None:
 
 
 @short_and_long
-def test_random_frames_on_the_uart(lit: Harness, count: int) -> None:
+def test_random_uart_frames_do_not_harm_the_node(lit: Harness, count: int) -> None:
     """Frames as they should be, with random IDs, lengths and parameters."""
     rng = np.random.default_rng(11)
     for _ in range(count):
@@ -68,7 +68,7 @@ def test_random_frames_on_the_uart(lit: Harness, count: int) -> None:
 
 
 @short_and_long
-def test_random_messages_on_i2c(lit: Harness, count: int) -> None:
+def test_random_i2c_messages_do_not_harm_the_node(lit: Harness, count: int) -> None:
     rng = np.random.default_rng(12)
     for _ in range(count):
         identifier = int(rng.integers(0, 256))
@@ -95,7 +95,7 @@ def test_random_messages_on_i2c(lit: Harness, count: int) -> None:
 
 
 @short_and_long
-def test_random_transitions_on_i2c(lit: Harness, count: int) -> None:
+def test_random_i2c_transitions_do_not_harm_the_node(lit: Harness, count: int) -> None:
     """Starts, bytes and stops in any order, as a disturbed bus may bring them."""
     rng = np.random.default_rng(13)
     for _ in range(count):
@@ -115,7 +115,7 @@ def test_random_transitions_on_i2c(lit: Harness, count: int) -> None:
     stays_sane(lit)
 
 
-def test_a_flood_of_good_frames_whose_answers_find_no_room(lit: Harness) -> None:
+def test_flood_of_frames_drops_whole_answers_when_the_uart_is_full(lit: Harness) -> None:
     flood = encode_frame(bytes([143])) + encode_frame(b"\x10") + encode_frame(b"\x80")
     answers = 0
     for _ in range(3000):

@@ -103,7 +103,7 @@ def read_all(board: Board) -> NDArray[np.uint8]:
     return np.frombuffer(board.perform(board.image_memory.read(0, IMAGE_BYTES)), np.uint8)
 
 
-def test_the_newest_picture_is_read_wherever_it_was_stored(board: Board) -> None:
+def test_newest_image_is_read_from_its_bank(board: Board) -> None:
     rng = np.random.default_rng(5)
     for bank in (0, 0, 1, 1, 0):
         board.state.settings.put("SelectImageBank", {"Bank": bank})
@@ -113,7 +113,7 @@ def test_the_newest_picture_is_read_wherever_it_was_stored(board: Board) -> None
         assert board.image_memory.read_now(1234, 128) == picture[1234:][:128].tobytes()
 
 
-def test_a_picture_that_was_not_stored_leaves_the_last_one(board: Board) -> None:
+def test_aborted_store_leaves_the_last_image_in_a_second_memory(board: Board) -> None:
     """Where there is a second memory; a shared one holds half of a picture then."""
     picture = np.arange(IMAGE_BYTES).astype(np.uint8)
     board.stored(picture)
@@ -122,7 +122,7 @@ def test_a_picture_that_was_not_stored_leaves_the_last_one(board: Board) -> None
     assert np.array_equal(read_all(board), picture)
 
 
-def test_while_the_next_picture_is_stored_the_last_one_is_there_or_none(board: Board) -> None:
+def test_last_image_is_readable_during_a_store_unless_memory_is_shared(board: Board) -> None:
     picture = np.arange(IMAGE_BYTES).astype(np.uint8)
     board.stored(picture)
     board.perform(board.image_memory.begin())
@@ -134,7 +134,7 @@ def test_while_the_next_picture_is_stored_the_last_one_is_there_or_none(board: B
         assert board.image_memory.read_now(7, 9) is None
 
 
-def test_without_supply_there_is_no_way_to_the_picture(board: Board) -> None:
+def test_unpowered_image_memory_cannot_be_read(board: Board) -> None:
     board.state.retained.imager_off = 1
     assert board.image_memory.read_now(0, 1) is None
 
@@ -160,7 +160,7 @@ def test_search_equals_array_search(board: Board, sky: Sky, config: DetectionCon
     assert np.array_equal(read_all(board), sky.picture.reshape(-1))
 
 
-def test_pixels_are_zero_on_the_bus_during_the_search(board: Board, sky: Sky) -> None:
+def test_visited_pixels_are_zeroed_over_the_bus(board: Board, sky: Sky) -> None:
     board.stored(sky.picture)
     written: set[int] = set()
 
@@ -209,7 +209,7 @@ def test_rate_is_twice_as_high_with_two_memories() -> None:
 
 @pytest.mark.parametrize("layout", Layout)
 @pytest.mark.parametrize("count", [1, 97, 128])
-def test_an_interrupt_pays_for_each_byte_that_it_reads(layout: Layout, count: int) -> None:
+def test_interrupt_is_charged_for_each_byte_it_reads(layout: Layout, count: int) -> None:
     """The memory has eight data lines: a bus cycle a byte."""
     board = Board(layout)
     board.external_ram = np.zeros(IMAGE_BYTES, np.uint8)
@@ -236,28 +236,32 @@ def size(buffers: tuple[Buffer, ...], name: str) -> int:
 
 
 @pytest.mark.parametrize("memory", Memory)
-def test_everything_fits(buffers: tuple[Buffer, ...], memory: Memory) -> None:
+def test_memory_budget_fits_the_cubestar_memories(
+    buffers: tuple[Buffer, ...], memory: Memory
+) -> None:
     spare = PROGRAM_RAM if memory is Memory.RAM else 0
     assert 0 < used(buffers)[memory] <= CAPACITY[memory] - spare
 
 
-def test_the_part() -> None:
+def test_memory_capacities_match_the_part() -> None:
     kilobytes = {memory.name: size / 1024 for memory, size in CAPACITY.items()}
     assert kilobytes == {"RAM": 128, "FLASH": 1024, "EXTERNAL_RAM": 1024, "RETENTION": 0.5}
 
 
-def test_every_byte_is_counted_once(buffers: tuple[Buffer, ...]) -> None:
+def test_memory_use_counts_every_byte_once(buffers: tuple[Buffer, ...]) -> None:
     assert sum(used(buffers).values()) == sum(buffer.size for buffer in buffers)
     assert all(buffer.size > 0 for buffer in buffers)
     assert len({(buffer.name, buffer.memory) for buffer in buffers}) == len(buffers)
 
 
-def test_the_catalogue_s_size(buffers: tuple[Buffer, ...], catalogue: StarCatalogue) -> None:
+def test_memory_budget_contains_the_catalogue_size(
+    buffers: tuple[Buffer, ...], catalogue: StarCatalogue
+) -> None:
     listed = size(buffers, "star list") + size(buffers, "pair list")
     assert listed == len(catalogue.to_bytes())
 
 
-def test_sizes_that_other_sources_give(buffers: tuple[Buffer, ...]) -> None:
+def test_memory_budget_sizes_match_other_sources(buffers: tuple[Buffer, ...]) -> None:
     assert size(buffers, "image") == IMAGE_BYTES
     retained = [buffer.size for buffer in buffers if buffer.memory is Memory.RETENTION]
     assert retained == [State.RETENTION_SIZE]
@@ -271,13 +275,15 @@ def test_visited_pixels_fit_at_the_limits_of_all_settings(buffers: tuple[Buffer,
     assert size(buffers, "visited pixels") == 4 * (71 * 100 + 256 * 99)
 
 
-def test_stars_beyond_the_published_list_are_kept_whole(buffers: tuple[Buffer, ...]) -> None:
+def test_memory_budget_counts_all_data_of_stars_beyond_20(buffers: tuple[Buffer, ...]) -> None:
     # 20 more: centroid, undistorted point, vector; size, intensity. The expected error of all 40.
     more = 20 * struct.calcsize("<2f 2f 3f B H") + 40 * struct.calcsize("<f")
     assert size(buffers, "stars beyond the published list") == more
 
 
-def test_the_reduced_list_s_size(buffers: tuple[Buffer, ...], catalogue: StarCatalogue) -> None:
+def test_reduced_pair_lists_fit_the_memory_budget(
+    buffers: tuple[Buffer, ...], catalogue: StarCatalogue
+) -> None:
     rng = np.random.default_rng(3)
     directions = rng.normal(size=(200, 3)).astype(np.float32)
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)

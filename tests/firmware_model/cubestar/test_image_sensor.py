@@ -11,7 +11,7 @@ def written(unit: Harness) -> list[str]:
     return [register.name if register else "" for register in registers]
 
 
-def test_the_set_up_for_stars(unit: Harness) -> None:
+def test_camera_set_up_writes_the_star_settings(unit: Harness) -> None:
     unit.command("CaptureImage")
     assert written(unit) == [
         "MODE_SELECT",
@@ -40,7 +40,7 @@ def test_the_set_up_for_stars(unit: Harness) -> None:
     assert [mode.field("OUTPUT_DEPTH").of(value) for value in modes] == [1, 1, 1]
 
 
-def test_it_is_done_once_and_again_after_a_change(unit: Harness) -> None:
+def test_camera_set_up_is_written_once_and_again_after_a_change(unit: Harness) -> None:
     unit.command("CaptureImage")
     unit.camera_writes.clear()
     unit.command("CaptureImage")
@@ -56,7 +56,7 @@ def test_it_is_done_once_and_again_after_a_change(unit: Harness) -> None:
 
 @pytest.mark.parametrize("step", range(8))
 @pytest.mark.parametrize("change", [False, True])
-def test_every_step_can_fail(unit: Harness, change: bool, step: int) -> None:
+def test_camera_set_up_can_fail_at_every_step(unit: Harness, change: bool, step: int) -> None:
     if change:
         unit.command("CaptureImage")
         unit.command("SetFrameRate", FrameRate=9)
@@ -91,14 +91,16 @@ def test_every_step_can_fail(unit: Harness, change: bool, step: int) -> None:
         ("SelectCameraRegister", "ISSetupError"),
     ],
 )
-def test_an_unanswered_access(unit: Harness, name: str, flag: str) -> None:
+def test_unacknowledged_camera_register_access_raises_its_flag(
+    unit: Harness, name: str, flag: str
+) -> None:
     unit.camera_refuses = lambda _data: True
     unit.command(name)
     assert unit.flags() == {flag}
     assert unit.telemetry("CameraRegister")["Valid"] == 0
 
 
-def test_times_of_the_set_up(unit: Harness) -> None:
+def test_camera_timing_reports_the_set_up_times(unit: Harness) -> None:
     assert not any(unit.telemetry("CameraTiming").values())
     unit.command("CaptureImage")
     set_up, changed = unit.camera_writes[:8], unit.camera_writes[5:8]

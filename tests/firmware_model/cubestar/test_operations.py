@@ -50,7 +50,7 @@ SEARCHES = {
 
 @pytest.mark.parametrize("search", SEARCHES)
 @pytest.mark.parametrize("picture", PICTURES)
-def test_detection(picture: str, search: str) -> None:
+def test_star_detection_charges_the_recorded_operations(picture: str, search: str) -> None:
     spent = meter()
     found = detect_stars(PICTURES[picture], SEARCHES[search], spent)
     places = found.centroids.astype(float)
@@ -78,7 +78,7 @@ SHOTS = {
 @pytest.mark.parametrize("hinted", [False, True])
 @pytest.mark.parametrize("shot", SHOTS)
 @pytest.mark.parametrize("way", ["votes", "confirmed"])
-def test_identification(
+def test_identification_charges_the_recorded_operations(
     catalogue: StarCatalogue, shoot: Shoot, way: str, shot: str, hinted: bool
 ) -> None:
     spent, taken = meter(), shoot(np.random.default_rng(7), **SHOTS[shot])
@@ -95,7 +95,9 @@ def test_identification(
 
 @pytest.mark.parametrize("verified", [False, True])
 @pytest.mark.parametrize("shot", SHOTS)
-def test_tracking(catalogue: StarCatalogue, shoot: Shoot, shot: str, verified: bool) -> None:
+def test_tracking_charges_the_recorded_operations(
+    catalogue: StarCatalogue, shoot: Shoot, shot: str, verified: bool
+) -> None:
     spent, taken = meter(), shoot(np.random.default_rng(7), **SHOTS[shot])
     turn = Rotation.from_rotvec([0.002, -0.001, 0.001]).as_matrix()
     field = pinhole() if verified else None

@@ -25,7 +25,7 @@ from .harness import FRAME_US, Harness
 from .sky import Sky, attitude_of, error_deg, take
 
 
-def test_the_period_is_exactly_one_second(unit: Harness) -> None:
+def test_loop_period_is_exactly_one_second(unit: Harness) -> None:
     unit.start_loop(20.5)
     times = unit.stored_us()[1:]  # the first one includes the camera's set-up
     assert len(times) == 20
@@ -47,7 +47,7 @@ def test_host_traffic_does_not_move_the_iterations(unit: Harness) -> None:
     assert len(unit.resets) == unit.telemetry("LoopStatus")["Iterations"]
 
 
-def test_delays_at_the_start_do_not_add_up(unit: Harness) -> None:
+def test_delays_at_iteration_start_do_not_accumulate(unit: Harness) -> None:
     start_us = unit.start_loop(0.9)
     for number in range(1, 11):
         unit.run(until_us=start_us + number * ITERATION_US)
@@ -57,7 +57,7 @@ def test_delays_at_the_start_do_not_add_up(unit: Harness) -> None:
     assert times[10] - times[1] == pytest.approx(9 * ITERATION_US, abs=50)
 
 
-def test_an_iteration_processes_while_the_next_picture_is_stored(lit: Harness) -> None:
+def test_iteration_processes_while_the_next_frame_is_stored(lit: Harness) -> None:
     order: list[str] = []
 
     def note(request: Request) -> None:
@@ -99,7 +99,7 @@ def test_an_iteration_processes_while_the_next_picture_is_stored(lit: Harness) -
     ]
 
 
-def test_the_attitude_of_a_picture_comes_one_iteration_later(
+def test_attitude_of_an_image_is_available_one_iteration_later(
     unit: Harness, catalogue: StarCatalogue, pose: Rotation
 ) -> None:
     poses = [pose * Rotation.from_euler("z", 0.2 * step, degrees=True) for step in range(4)]
@@ -117,7 +117,7 @@ def test_the_attitude_of_a_picture_comes_one_iteration_later(
             assert values["ImageTime"] == pytest.approx(stored_at / 1000 + 386 - 227, abs=2)
 
 
-def test_what_survives_the_reset(lit: Harness, sky: Sky) -> None:
+def test_loop_reset_loses_results_but_keeps_settings_and_attitude(lit: Harness, sky: Sky) -> None:
     lit.command("setIDMargin", Margin=0.0012)
     lit.command("IDStars")
     start_us = lit.start_loop(1.98)
@@ -142,7 +142,7 @@ def test_what_survives_the_reset(lit: Harness, sky: Sky) -> None:
     assert np.array_equal(lit.external_ram[: sky.picture.size], sky.picture.reshape(-1))
 
 
-def test_the_phases_fill_the_second(unit: Harness) -> None:
+def test_loop_phases_add_up_to_the_iteration_period(unit: Harness) -> None:
     unit.start_loop(3.9)
     values = unit.telemetry("PhaseTimes")
     total = sum(values[name] for name in ("Idle", "Discard", "Capture", "Transfer"))
@@ -155,7 +155,7 @@ def test_the_phases_fill_the_second(unit: Harness) -> None:
     assert times["MaxLoopTime"] > times["LoopTime"]  # the first one set the camera up
 
 
-def test_a_failed_capture_leaves_nothing_to_process(lit: Harness) -> None:
+def test_loop_does_not_process_after_a_failed_capture(lit: Harness) -> None:
     start_us = lit.start_loop(1.9)
     assert lit.telemetry("AttitudeQuaternion")["FrameCounter"] == 1
     lit.camera_refuses = lambda _data: True
@@ -172,7 +172,7 @@ def test_a_failed_capture_leaves_nothing_to_process(lit: Harness) -> None:
     assert np.diff(lit.stored_us()[-2:]) == pytest.approx(ITERATION_US, abs=10_000)
 
 
-def test_a_latch_up_in_the_loop_costs_one_picture(lit: Harness) -> None:
+def test_latch_up_in_the_loop_costs_one_frame(lit: Harness) -> None:
 
     def strike(request: Request) -> None:
         if isinstance(request, AwaitPin):
@@ -211,7 +211,7 @@ def test_a_latch_up_at_the_reset_is_not_forgotten(unit: Harness) -> None:
     assert unit.telemetry("SupplyReport")["PowerCycles"] == 1
 
 
-def test_a_lasting_short_circuit_leaves_the_node_in_command(unit: Harness) -> None:
+def test_node_still_answers_during_a_persistent_short_circuit(unit: Harness) -> None:
     def shorted(_request: Request) -> None:
         if unit.switches["imager"]:
             unit.program.supply.overcurrent("imager")
@@ -230,7 +230,7 @@ def test_a_lasting_short_circuit_leaves_the_node_in_command(unit: Harness) -> No
     assert unit.telemetry("PowerStatus")["Status"] == 1
 
 
-def test_the_time_from_reset_to_the_main_loop(unit: Harness) -> None:
+def test_startup_time_is_the_boot_time_after_every_reset(unit: Harness) -> None:
     assert unit.telemetry("StartAndLoopTime")["StartupTime"] == Harness.boot_us / 1000
     unit.command("CaptureImage", "MCUReset")
     assert unit.telemetry("StartAndLoopTime")["StartupTime"] == Harness.boot_us / 1000
@@ -245,7 +245,7 @@ def idle_us(unit: Harness) -> int:
     return int(unit.telemetry("PhaseTimes")["Idle"])
 
 
-def test_idle_time_is_what_was_slept_since_the_last_capture(unit: Harness) -> None:
+def test_idle_time_is_the_sleep_since_the_last_capture(unit: Harness) -> None:
     unit.run(until_us=unit.now_us + 123_000)
     unit.command("CaptureImage")
     assert idle_us(unit) == pytest.approx(123_000 + Harness.boot_us, abs=50)
@@ -257,12 +257,12 @@ def test_idle_time_is_what_was_slept_since_the_last_capture(unit: Harness) -> No
     assert idle_us(unit) == pytest.approx(110_000, abs=200)
 
 
-def test_work_is_not_idle_time(unit: Harness) -> None:
+def test_work_time_is_not_counted_as_idle(unit: Harness) -> None:
     unit.command("CaptureImage", "TestSRAM", "CaptureImage")
     assert idle_us(unit) < 100
 
 
-def test_a_reset_counts_as_idle_time(unit: Harness) -> None:
+def test_reset_counts_as_idle_time(unit: Harness) -> None:
     unit.command("CaptureImage")
     unit.run(until_us=unit.now_us + 10_000)
     unit.command("MCUReset")
@@ -271,7 +271,7 @@ def test_a_reset_counts_as_idle_time(unit: Harness) -> None:
     assert idle_us(unit) == pytest.approx(30_000 + Harness.boot_us, abs=200)
 
 
-def test_phases_of_the_last_picture_survive_a_reset(unit: Harness) -> None:
+def test_phase_times_of_the_last_capture_survive_a_reset(unit: Harness) -> None:
     unit.command("CaptureImage")
     before = unit.telemetry("PhaseTimes")
     assert before["Capture"] == pytest.approx(FRAME_US, abs=10)
@@ -279,7 +279,7 @@ def test_phases_of_the_last_picture_survive_a_reset(unit: Harness) -> None:
     assert unit.telemetry("PhaseTimes") == before
 
 
-def test_a_camera_that_was_never_set_up_is_waited_for_after_a_reset(unit: Harness) -> None:
+def test_reset_waits_for_the_camera_to_settle_if_it_was_never_set_up(unit: Harness) -> None:
     """It may have got its supply only now; one that was set up has long settled."""
     times_us = []
     for commands in (("MCUReset",), ("CaptureImage", "MCUReset")):

@@ -24,7 +24,7 @@ def test_telecommands_are_served_in_the_idle_time(unit: Harness) -> None:
     assert "TimingError" not in unit.flags()
 
 
-def test_a_telecommand_that_comes_just_before_the_reset_is_not_lost(unit: Harness) -> None:
+def test_telecommand_just_before_the_loop_reset_is_not_lost(unit: Harness) -> None:
     start_us = unit.start_loop(0.5)
     for number, early_us in enumerate((200, 20, 2, 1), start=1):
         unit.run(until_us=start_us + number * ITERATION_US - RESET_LEAD_US - early_us)
@@ -34,7 +34,7 @@ def test_a_telecommand_that_comes_just_before_the_reset_is_not_lost(unit: Harnes
     assert len(unit.resets) == 4
 
 
-def test_a_frame_that_straddles_the_reset_is_not_lost(unit: Harness) -> None:
+def test_uart_frame_that_straddles_the_loop_reset_delays_the_reset(unit: Harness) -> None:
     start_us = unit.start_loop(0.5)
     message = INTERFACE.telecommand("Exposure")
     frame = encode_frame(bytes([message.id]) + message.pack(exposure=6))
@@ -49,7 +49,7 @@ def test_a_frame_that_straddles_the_reset_is_not_lost(unit: Harness) -> None:
     assert np.diff(unit.stored_us()[1:]) == pytest.approx(ITERATION_US, abs=100)
 
 
-def test_an_i2c_transfer_across_the_reset_keeps_its_answer(unit: Harness) -> None:
+def test_i2c_transfer_across_the_reset_keeps_its_answer(unit: Harness) -> None:
     start_us = unit.start_loop(0.5)
     link = unit.program.link
     unit.run(until_us=start_us + ITERATION_US - RESET_LEAD_US - 50)
@@ -62,7 +62,7 @@ def test_an_i2c_transfer_across_the_reset_keeps_its_answer(unit: Harness) -> Non
     link.i2c_stop()
 
 
-def test_a_long_telecommand_makes_the_next_iteration_late(unit: Harness) -> None:
+def test_long_telecommand_delays_the_next_iteration(unit: Harness) -> None:
     start_us = unit.start_loop(0.9)
     unit.send("CaptureAndProcess")
     unit.run(until_us=start_us + 1_500_000)
@@ -74,7 +74,7 @@ def test_a_long_telecommand_makes_the_next_iteration_late(unit: Harness) -> None
     assert np.diff(times[2:]) == pytest.approx(ITERATION_US, abs=100)  # in step again
 
 
-def test_an_iteration_that_takes_too_long(unit: Harness) -> None:
+def test_iteration_longer_than_its_period_sets_timing_error(unit: Harness) -> None:
     unit.command("SetDiscardDelay", Delay=600)  # 600 + 386 + 404 ms
     start_us = unit.start_loop(1.0)
     assert "TimingError" not in unit.flags()
@@ -92,7 +92,7 @@ def test_an_iteration_that_takes_too_long(unit: Harness) -> None:
     assert not unit.telemetry("LoopStatus")["Running"]
 
 
-def test_stopping_ends_the_resets_and_keeps_the_results(lit: Harness, sky: Sky) -> None:
+def test_stop_loop_ends_the_resets_and_keeps_the_results(lit: Harness, sky: Sky) -> None:
     lit.start_loop(1.5)
     lit.command("StopLoop")
     assert len(lit.resets) == 1
@@ -102,7 +102,7 @@ def test_stopping_ends_the_resets_and_keeps_the_results(lit: Harness, sky: Sky) 
 
 
 @pytest.mark.parametrize("name", ["MCUReset", "TestWDG"])
-def test_the_loop_goes_on_after_other_resets(unit: Harness, name: str) -> None:
+def test_loop_continues_after_other_resets(unit: Harness, name: str) -> None:
     start_us = unit.start_loop(0.95)
     unit.send(name)
     unit.run(until_us=start_us + 8_000_000)
@@ -110,14 +110,14 @@ def test_the_loop_goes_on_after_other_resets(unit: Harness, name: str) -> None:
     assert np.diff(unit.stored_us()[-4:]) == pytest.approx(ITERATION_US, abs=100)
 
 
-def test_a_reset_by_telecommand_ends_the_loop(unit: Harness) -> None:
+def test_telecommanded_reset_ends_the_loop(unit: Harness) -> None:
     unit.start_loop(0.95)
     unit.command("Reset")
     assert not unit.telemetry("LoopStatus")["Running"]
     assert unit.telemetry("LoopStatus")["Iterations"] == 0
 
 
-def test_triggering_while_the_delay_timer_runs(unit: Harness) -> None:
+def test_second_trigger_during_the_delay_sets_timer_already_running(unit: Harness) -> None:
     unit.command("setDelayTimerTimeout", Time=100)
     for _ in range(2):  # also after the loop ran before
         unit.command("ClearErrorFlags")
@@ -135,7 +135,7 @@ def test_triggering_while_the_delay_timer_runs(unit: Harness) -> None:
         unit.command("StopLoop")
 
 
-def test_stopping_while_the_delay_timer_runs(unit: Harness) -> None:
+def test_stop_loop_during_the_delay_prevents_the_first_iteration(unit: Harness) -> None:
     unit.command("setDelayTimerTimeout", Time=100)
     unit.start_loop(0.5)
     unit.command("StopLoop")

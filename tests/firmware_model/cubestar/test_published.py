@@ -36,7 +36,7 @@ def modes(unit: Harness, picture: np.ndarray) -> tuple[int, MatchMode]:
     return unit.telemetry("AttitudeQuaternion")["Mode"], flag
 
 
-def test_the_flag_goes_from_lost_to_tracking_and_back_by_itself(
+def test_published_mode_flag_switches_between_lost_and_tracking(
     make: Make, catalogue: StarCatalogue, sky: Sky, pose: Rotation
 ) -> None:
     unit, tracking, lost = make("transitions"), MatchMode.TRACKING, MatchMode.LOST_IN_SPACE
@@ -54,7 +54,9 @@ def test_the_flag_goes_from_lost_to_tracking_and_back_by_itself(
     assert modes(unit, elsewhere) == (tracking, tracking)
 
 
-def test_each_turn_pays_for_a_page_with_quaternion_and_matrix(make: Make, sky: Sky) -> None:
+def test_published_profile_writes_quaternion_and_matrix_to_flash_each_time(
+    make: Make, sky: Sky
+) -> None:
     spent, pages = [], []
     for unit in (make("flash_store"), make()):
         unit.picture = sky.picture
@@ -73,7 +75,7 @@ def test_each_turn_pays_for_a_page_with_quaternion_and_matrix(make: Make, sky: S
     assert error_deg(stored, sky.attitude) < 0.005
 
 
-def test_a_worn_page_keeps_its_zeros() -> None:
+def test_worn_out_flash_page_can_only_clear_bits() -> None:
     flash = FlashStore(writes={"attitude": FLASH_ENDURANCE - 1})
     for new, kept in ((b"\x0f\x00", b"\x0f\x00"), (b"\xf1\xff", b"\x01\x00")):
         flash.write("attitude", new, FLASH_ENDURANCE)

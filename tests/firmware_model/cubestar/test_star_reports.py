@@ -59,7 +59,7 @@ def test_each_read_gives_the_next_star_and_wraps(solved: Harness, sky: Sky, fram
 
 
 @pytest.mark.parametrize("frame", STEPPING)
-def test_frames_step_on_their_own(solved: Harness, frame: str) -> None:
+def test_stepping_telemetry_frames_have_independent_positions(solved: Harness, frame: str) -> None:
     first = solved.telemetry(frame)
     for other in STEPPING:
         if other != frame:
@@ -69,7 +69,7 @@ def test_frames_step_on_their_own(solved: Harness, frame: str) -> None:
 
 
 @pytest.mark.parametrize("frame", STEPPING)
-def test_new_results_start_over(solved: Harness, frame: str) -> None:
+def test_new_results_restart_stepping_telemetry(solved: Harness, frame: str) -> None:
     first = solved.telemetry(frame)
     solved.telemetry(frame)
     solved.command("setIDMode", IdMode=IdMode.LOST_IN_SPACE)  # as before
@@ -78,7 +78,7 @@ def test_new_results_start_over(solved: Harness, frame: str) -> None:
 
 
 @pytest.mark.parametrize("frame", STEPPING)
-def test_without_a_star_there_is_none(unit: Harness, frame: str) -> None:
+def test_star_telemetry_without_stars_is_empty(unit: Harness, frame: str) -> None:
     values = unit.telemetry(frame)
     assert values["StarNumber"] == 255
     identity = next((values[name] for name in ("Identity", "ID") if name in values), 65535)
@@ -88,7 +88,7 @@ def test_without_a_star_there_is_none(unit: Harness, frame: str) -> None:
 
 
 @pytest.mark.parametrize("frame", [frame for frame in STEPPING if frame in OF_IDENTIFIED_STARS])
-def test_a_failed_identification_leaves_none(solved: Harness, frame: str) -> None:
+def test_failed_identification_reports_no_identified_stars(solved: Harness, frame: str) -> None:
     solved.command("setIDMargin", Margin=0.0001)
     solved.command("setFocalLength", FocalLength=7.0)
     solved.command("ProcessImage")
@@ -96,7 +96,7 @@ def test_a_failed_identification_leaves_none(solved: Harness, frame: str) -> Non
     assert solved.telemetry("NumIdStars")["numIdStars"] == 0
 
 
-def test_detected_stars(solved: Harness, sky: Sky) -> None:
+def test_star_telemetry_shows_positions_vectors_and_details(solved: Harness, sky: Sky) -> None:
     stars = truth(solved, sky)
     ideal = undistort(sky.pixels)
     body = sky.attitude.apply(solved.catalogue.vectors[sky.stars].astype(float))
@@ -120,7 +120,7 @@ def test_detected_stars(solved: Harness, sky: Sky) -> None:
     assert pick(details[spot], "ID", "ValidationVote", "confidance") == [65535, 0, 0]
 
 
-def test_identities(solved: Harness, sky: Sky) -> None:
+def test_identified_star_telemetry_shows_names_and_votes(solved: Harness, sky: Sky) -> None:
     stars = truth(solved, sky)
     assert solved.telemetry("NumIdStars")["numIdStars"] == len(stars)
     details = records(solved, "IDStarsDetails", len(stars))
@@ -141,7 +141,7 @@ def test_identities(solved: Harness, sky: Sky) -> None:
         assert pick(names[number], "X", "Y") == near(sky.pixels[star], 0.05)
 
 
-def test_match_summary(solved: Harness, sky: Sky) -> None:
+def test_match_summary_reports_counts_votes_and_confidence(solved: Harness, sky: Sky) -> None:
     count = len(sky.stars)
     values = solved.telemetry("MatchSummary")
     assert (values["Detected"], values["Matched"]) == (count + 1, count)
@@ -151,7 +151,7 @@ def test_match_summary(solved: Harness, sky: Sky) -> None:
     assert not any(fresh.values())
 
 
-def test_selected_are_the_brightest_of_those_with_most_votes(solved: Harness, sky: Sky) -> None:
+def test_best_stars_are_the_brightest_with_the_most_votes(solved: Harness, sky: Sky) -> None:
     stars = truth(solved, sky)
     positions = records(solved, "StarPositions", len(stars) + 1)
     bodies = records(solved, "BodyUnitVectors", len(stars) + 1)
@@ -172,7 +172,7 @@ def test_selected_are_the_brightest_of_those_with_most_votes(solved: Harness, sk
         assert pick(values, f"S{n}CatNum", f"S{n}Conf") == [identity, confidence]
 
 
-def test_fewer_than_three_can_be_selected(lit: Harness, sky: Sky) -> None:
+def test_best_stars_can_be_fewer_than_three(lit: Harness, sky: Sky) -> None:
     lit.command("CaptureAndProcess")
     lit.command("setIDMode", IdMode=0)  # tracking needs two stars
     lit.picture = take(lit.catalogue, sky.attitude, most=2).picture

@@ -34,18 +34,18 @@ def state(memories: Memories) -> State:
     return State(memories, Meter(CORTEX_M3))  # type: ignore[arg-type]
 
 
-def test_the_layout_fits_the_retention_registers(memories: Memories) -> None:
+def test_state_layout_fits_the_retention_registers(memories: Memories) -> None:
     assert State.RETENTION_SIZE <= RETENTION_BYTES
     state(memories).retain()
     assert len(memories.retention) == RETENTION_BYTES
     assert not any(memories.retention[State.RETENTION_SIZE :])
 
 
-def test_everything_is_zero_at_power_up(memories: Memories) -> None:
+def test_counters_are_zero_after_power_up(memories: Memories) -> None:
     assert {name for name in COUNTERS if getattr(state(memories).retained, name)} == set()
 
 
-def test_settings_flags_and_counters_come_back(memories: Memories) -> None:
+def test_settings_flags_and_counters_are_retained(memories: Memories) -> None:
     before = state(memories)
     before.save_config()
     before.settings.put("Exposure", {"exposure": 1234})  # goes before the configuration
@@ -67,7 +67,7 @@ def test_a_counter_that_overflows_wraps(name: str, memories: Memories) -> None:
     assert getattr(state(memories).retained, name) == 3
 
 
-def test_without_the_mark_the_retention_registers_mean_nothing(memories: Memories) -> None:
+def test_retention_registers_without_their_mark_are_ignored(memories: Memories) -> None:
     memories.retention[:] = np.random.default_rng(7).bytes(RETENTION_BYTES)
     fresh = state(memories)
     assert fresh.retained == Retained()
@@ -75,7 +75,7 @@ def test_without_the_mark_the_retention_registers_mean_nothing(memories: Memorie
     assert fresh.settings.pack() == state(Memories()).settings.pack()
 
 
-def test_forgetting_returns_to_the_values_after_power_up(memories: Memories) -> None:
+def test_forget_restores_power_up_values_and_saved_settings(memories: Memories) -> None:
     before = state(memories)
     before.settings.put("Exposure", {"exposure": 5})
     before.save_config()
@@ -89,7 +89,7 @@ def test_forgetting_returns_to_the_values_after_power_up(memories: Memories) -> 
     assert before.flags == set()
 
 
-def test_the_mode_flag(memories: Memories) -> None:
+def test_mode_flag_is_stored_and_written_only_on_change(memories: Memories) -> None:
     assert state(memories).mode is MatchMode.LOST_IN_SPACE
     for mode in MatchMode:
         state(memories).mode = mode
@@ -99,7 +99,7 @@ def test_the_mode_flag(memories: Memories) -> None:
     assert memories.flash.writes == writes  # it is that already
 
 
-def test_the_attitude_is_kept_in_single_precision(memories: Memories) -> None:
+def test_attitude_is_stored_in_single_precision(memories: Memories) -> None:
     assert state(memories).attitude is None
     quaternion = np.array([0.1, -0.2, 0.3, 0.9], np.float32)
     kept = Attitude(quaternion, 7, 123_456, 12, MatchMode.TRACKING)
@@ -111,12 +111,12 @@ def test_the_attitude_is_kept_in_single_precision(memories: Memories) -> None:
     assert (found.frame, found.image_ms, found.matched, found.mode) == (7, 123_456, 12, 0)
 
 
-def test_pictures_and_times_beyond_32_bits_wrap() -> None:
+def test_frame_and_time_beyond_32_bits_wrap() -> None:
     far = Attitude(np.array([0, 0, 0, 1], np.float32), 2**32 + 5, 2**33 + 6, 3, 2)
     found = Attitude.unpack(far.pack())
     assert (found.frame, found.image_ms) == (5, 6)
 
 
-def test_a_flag_that_is_not_declared_is_a_programming_error() -> None:
+def test_undeclared_flag_raises_interface_error() -> None:
     with pytest.raises(InterfaceError, match="no error flag 'Oops' in telemetry; known: "):
         state(Memories()).raise_flag("Oops")

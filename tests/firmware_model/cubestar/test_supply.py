@@ -25,7 +25,7 @@ def test_interrupt_opens_and_main_loop_closes_the_switch(unit: Harness, channel:
     assert unit.flags() == {"OverCurrent"}
 
 
-def test_a_channel_that_is_cut_during_the_pause_has_a_pause_of_its_own(unit: Harness) -> None:
+def test_channel_cut_during_another_pause_stays_off_for_a_full_pause(unit: Harness) -> None:
     start_us = unit.now_us
     unit.program.supply.overcurrent("memory")
     unit.run(until_us=start_us + OFF_TIME_US - 1_000)
@@ -37,7 +37,7 @@ def test_a_channel_that_is_cut_during_the_pause_has_a_pause_of_its_own(unit: Har
     assert unit.now_us - start_us > 2 * OFF_TIME_US
 
 
-def test_the_camera_is_set_up_again_after_its_power_cycle(unit: Harness) -> None:
+def test_camera_is_set_up_again_after_its_power_cycle(unit: Harness) -> None:
     unit.command("Exposure", exposure=100)
     unit.command("CaptureImage")
     set_up = dict(unit.camera)
@@ -49,7 +49,7 @@ def test_the_camera_is_set_up_again_after_its_power_cycle(unit: Harness) -> None
     assert unit.camera == set_up
 
 
-def test_the_camera_is_not_set_up_twice_otherwise(unit: Harness) -> None:
+def test_memory_power_cycle_does_not_repeat_the_camera_set_up(unit: Harness) -> None:
     unit.command("CaptureImage")
     count = len(unit.camera_writes)
     unit.program.supply.overcurrent("memory")
@@ -58,7 +58,7 @@ def test_the_camera_is_not_set_up_twice_otherwise(unit: Harness) -> None:
     assert len(unit.camera_writes) == count + 2  # enable and disable
 
 
-def test_the_memory_channel_loses_the_picture(lit: Harness) -> None:
+def test_memory_latch_up_loses_the_image(lit: Harness) -> None:
     lit.command("CaptureImage")
     lit.program.supply.overcurrent("memory")
     assert not lit.telemetry("PerformanceParameters")["ImageCaptureSuccess"]
@@ -91,7 +91,7 @@ def test_latch_up_spoils_only_its_own_capture(lit: Harness, channel: str, moment
     assert lit.status() is TaskStatus.CALCULATED
 
 
-def test_under_current(unit: Harness) -> None:
+def test_under_current_sets_its_flag(unit: Harness) -> None:
     unit.command("CaptureImage")
     assert unit.flags() == set()
     unit.currents["memory"] = UNDER_CURRENT_MA / 2
@@ -99,7 +99,7 @@ def test_under_current(unit: Harness) -> None:
     assert unit.flags() == {"UnderCurrent"}
 
 
-def test_no_current_behind_an_open_switch_is_no_error(unit: Harness) -> None:
+def test_zero_current_behind_an_open_switch_sets_no_flag(unit: Harness) -> None:
     unit.command("TogglePowerSW")
     assert unit.telemetry("PowerStatus")["Current"] == 0
     unit.program.supply.overcurrent("memory")
@@ -107,7 +107,9 @@ def test_no_current_behind_an_open_switch_is_no_error(unit: Harness) -> None:
     assert unit.flags() == {"OverCurrent"}
 
 
-def test_currents_of_imager_and_memory(unit: Harness, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_power_status_reports_latest_minimum_and_maximum_current(
+    unit: Harness, monkeypatch: pytest.MonkeyPatch
+) -> None:
     unit.command("CaptureImage")
     values = unit.telemetry("PowerStatus")
     assert (values["Current"], values["MinCurrent"], values["MaxCurrent"]) == (53, 53, 53)
@@ -135,7 +137,7 @@ def test_each_channel_is_reported(unit: Harness) -> None:
     assert (values["SramCurrent"], values["ImagerCurrent"]) == (3.1, 101.5)
 
 
-def test_an_open_switch_stays_open_over_a_reset_of_the_processor(unit: Harness) -> None:
+def test_open_supply_switch_stays_open_across_a_processor_reset(unit: Harness) -> None:
     unit.command("TogglePowerSW", "MCUReset")
     assert unit.telemetry("PowerStatus")["Status"] == 0
     unit.command("TogglePowerSW")
@@ -143,7 +145,7 @@ def test_an_open_switch_stays_open_over_a_reset_of_the_processor(unit: Harness) 
     assert unit.telemetry("PowerStatus")["Status"] == 1
 
 
-def test_opening_the_switch_of_a_channel_that_is_cut_leaves_it_open(unit: Harness) -> None:
+def test_opening_the_switch_of_a_cut_channel_keeps_it_open(unit: Harness) -> None:
     supply = unit.program.supply
 
     def strike(request: Request) -> None:
@@ -170,7 +172,7 @@ def test_a_capture_with_the_switch_open_fails(unit: Harness) -> None:
 
 
 @pytest.mark.parametrize("name", ["Reset", "MCUReset"])
-def test_a_channel_that_is_cut_just_before_a_reset_comes_back(unit: Harness, name: str) -> None:
+def test_channel_cut_just_before_a_reset_is_switched_on_again(unit: Harness, name: str) -> None:
     def strike(request: Request) -> None:
         unit.on_request = lambda _request: None
         unit.program.supply.overcurrent("imager")

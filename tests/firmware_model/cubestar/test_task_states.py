@@ -86,7 +86,7 @@ CAUSES: dict[tuple[int, ...], Act] = {
 }
 
 
-def test_the_list_is_the_published_one() -> None:
+def test_task_states_are_the_published_ones() -> None:
     assert [int(status) for status in TaskStatus] == list(range(40))
     assert {status for status in TaskStatus if status.name.endswith("FAILED")} == FAILED
     assert sorted(state for states in CAUSES for state in states) == list(range(40))
@@ -111,13 +111,13 @@ def test_every_state_is_reached_by_its_cause(unit: Harness, sky: Sky, status: Ta
         assert last is status  # whoever polls later finds it
 
 
-def test_a_task_that_ends_does_not_look_busy(unit: Harness) -> None:
+def test_task_states_for_begun_and_ended_are_disjoint(unit: Harness) -> None:
     begun = {task.begun for task in TASKS.values()} - {TaskStatus.RECEIVING_IMAGE}
     ended = {task.done for task in TASKS.values()} | {task.failed for task in TASKS.values()}
     assert not begun & ended
 
 
-def test_a_refused_pattern_or_block_fails_and_leaves_nothing(unit: Harness) -> None:
+def test_refused_test_pattern_fails_and_leaves_no_image(unit: Harness) -> None:
     refused("CaptureTestPatern", TestPaternType=3)(unit, None)  # type: ignore[arg-type]
     assert unit.status() is TaskStatus.PATTERN_FAILED
     assert unit.flags() == {"TestPatternConfigError"}
@@ -125,7 +125,7 @@ def test_a_refused_pattern_or_block_fails_and_leaves_nothing(unit: Harness) -> N
     assert unit.flags() == {"TestPatternConfigError", "StatusError"}  # there is no picture
 
 
-def test_a_block_without_an_upload_or_behind_a_latch_up_fails(unit: Harness) -> None:
+def test_upload_block_fails_without_an_upload_or_after_a_latch_up(unit: Harness) -> None:
     block = {"BlockNumber": 1, "Data": b"\7" * 128}
     unit.command("UploadBlock", **block)
     assert unit.status() is TaskStatus.RECEIVING_FAILED
@@ -140,7 +140,7 @@ def test_a_block_without_an_upload_or_behind_a_latch_up_fails(unit: Harness) -> 
     assert unit.status() is TaskStatus.DETECTION_FAILED
 
 
-def test_an_exposure_is_with_the_sensor_when_it_is_set(unit: Harness) -> None:
+def test_exposure_telecommand_writes_the_sensor_immediately(unit: Harness) -> None:
     unit.command("Exposure", exposure=321)
     assert unit.camera_value("EXPOSURE") == 321
     unit.log.clear()

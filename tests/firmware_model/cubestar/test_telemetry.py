@@ -53,7 +53,7 @@ ELSEWHERE = {
 telemetry = registered_in(CHECKS)  #: Decorator: the test is of the named telemetry
 
 
-def test_every_frame_is_tested_once() -> None:
+def test_every_telemetry_frame_is_tested_once() -> None:
     assert sorted([*CHECKS, *ELSEWHERE, *SETTINGS_SHOWN, *TIMES_SHOWN]) == sorted(SUPPORTED)
 
 
@@ -64,7 +64,7 @@ def test_a_frame_that_is_not_supported_is_not_answered(unit: Harness) -> None:
 
 
 @pytest.mark.parametrize("name", SUPPORTED)
-def test_every_frame_is_whole_at_any_time(name: str, lit: Harness) -> None:
+def test_telemetry_frames_are_complete_at_any_time(name: str, lit: Harness) -> None:
     message = INTERFACE.telemetry(name)
 
     def asked(_request: object = None) -> None:
@@ -77,7 +77,7 @@ def test_every_frame_is_whole_at_any_time(name: str, lit: Harness) -> None:
 
 
 @telemetry("Identification")
-def test_identification(unit: Harness) -> None:
+def test_identification_reports_type_versions_and_runtime(unit: Harness) -> None:
     unit.now_us = 65_536_000_000 + 7_654_321
     values = unit.telemetry("Identification")
     assert values == {
@@ -91,7 +91,7 @@ def test_identification(unit: Harness) -> None:
 
 
 @telemetry("ExtendedIdentification")
-def test_extended_identification(unit: Harness) -> None:
+def test_extended_identification_reports_resets_and_counters(unit: Harness) -> None:
     unit.command("TestWDG", "Exposure")
     unit.telemetry("IDMode")
     assert unit.telemetry("ExtendedIdentification") == {
@@ -105,7 +105,7 @@ def test_extended_identification(unit: Harness) -> None:
 
 
 @telemetry("TaskStatus")
-def test_task_status(lit: Harness) -> None:
+def test_task_status_shows_the_steps_of_processing(lit: Harness) -> None:
     seen = []
     lit.on_request = lambda _request: seen.append(lit.telemetry("TaskStatus")["taskStatus"])
     lit.command("CaptureAndProcess")
@@ -124,7 +124,7 @@ def test_task_status(lit: Harness) -> None:
 
 
 @telemetry("LogStatus")
-def test_log_status(unit: Harness) -> None:
+def test_log_status_reports_flags_temperature_and_runtime(unit: Harness) -> None:
     unit.command("TestWDG", "IDStars")
     unit.now_us = 99_999 * 1_000_000
     unit.currents["imager"] = 60.1
@@ -143,7 +143,7 @@ def test_log_status(unit: Harness) -> None:
 
 
 @telemetry("LoopStatus")
-def test_loop_status(unit: Harness) -> None:
+def test_loop_status_reports_settings_and_iterations(unit: Harness) -> None:
     unit.command("setTrackingMode", RightAscension=0.0, Declination=0.0)
     unit.command("SetFrameRate", FrameRate=9)
     unit.command("SetDiscardDelay", Delay=71)
@@ -162,12 +162,12 @@ def test_loop_status(unit: Harness) -> None:
 
 
 @telemetry("ImageSetup")
-def test_image_setup(unit: Harness) -> None:
+def test_image_setup_reports_size_and_first_line(unit: Harness) -> None:
     assert unit.telemetry("ImageSetup") == {"FirstLine": 0, "Width": 1024, "Height": 512}
 
 
 @telemetry("PhaseTimes", "TimingSummary")
-def test_phase_times(lit: Harness) -> None:
+def test_phase_times_and_timing_summary_agree(lit: Harness) -> None:
     lit.command("CaptureAndProcess")
     phases = lit.telemetry("PhaseTimes")
     assert phases.pop("LoopTotal") == 0
@@ -181,7 +181,7 @@ def test_phase_times(lit: Harness) -> None:
 
 
 @telemetry("DetectionThresholdValues")
-def test_thresholds(unit: Harness) -> None:
+def test_detection_threshold_telemetry_shows_the_dark_level(unit: Harness) -> None:
     unit.command("setDetectionThresholds", DetectionThreshold=40, StarThreshold=30)
     values = {"DarkThreshold": 0, "DetectionThreshold": 40, "StarThreshold": 30}
     assert unit.telemetry("DetectionThresholdValues") == values
@@ -190,7 +190,7 @@ def test_thresholds(unit: Harness) -> None:
     assert unit.telemetry("DetectionThresholdValues") == values | {"DarkThreshold": 17}
 
 
-def test_counters_wrap_or_saturate_on_the_wire(unit: Harness) -> None:
+def test_telemetry_counters_wrap_or_saturate(unit: Harness) -> None:
     retained = unit.program.commands.state.retained
     retained.telecommands = retained.telemetry = 65_536 + 5
     retained.watchdog_resets = retained.latch_ups = 70_000
@@ -204,7 +204,7 @@ def test_counters_wrap_or_saturate_on_the_wire(unit: Harness) -> None:
     assert unit.telemetry("StartAndLoopTime")["MaxLoopTime"] == 65_535
 
 
-def test_asking_changes_nothing_but_the_count_of_requests(lit: Harness) -> None:
+def test_telemetry_requests_do_not_change_telemetry(lit: Harness) -> None:
     lit.command("setIDMode", IdMode=IdMode.TRACKING)
     lit.command("CaptureAndProcess")
     steady = [
@@ -220,13 +220,15 @@ def test_asking_changes_nothing_but_the_count_of_requests(lit: Harness) -> None:
 
 
 @pytest.mark.parametrize("frame", SETTINGS_SHOWN | TIMES_SHOWN)
-def test_every_field_of_the_frame_shows_something(frame: str) -> None:
+def test_every_field_of_a_settings_or_times_frame_is_tested(frame: str) -> None:
     shown = {**SETTINGS_SHOWN, **TIMES_SHOWN}[frame]
     assert list(shown) == [field.name for field in INTERFACE.telemetry(frame).fields]
 
 
 @pytest.mark.parametrize("frame", SETTINGS_SHOWN)
-def test_a_frame_shows_the_setting_that_its_field_is_named_after(unit: Harness, frame: str) -> None:
+def test_telemetry_shows_each_setting_with_its_default_type_and_unit(
+    unit: Harness, frame: str
+) -> None:
     values = unit.telemetry(frame)
     for field, (command, parameter) in SETTINGS_SHOWN[frame].items():
         assert command in SETTING_COMMANDS
@@ -240,7 +242,7 @@ def test_a_frame_shows_the_setting_that_its_field_is_named_after(unit: Harness, 
         )
 
 
-def test_a_frame_shows_the_times_of_its_steps(unit: Harness) -> None:
+def test_telemetry_shows_latest_and_longest_time_of_each_step(unit: Harness) -> None:
     processing = unit.program.commands.processing
     steps = sorted({step for shown in TIMES_SHOWN.values() for step in shown.values()})
     for number, step in enumerate(steps):
@@ -253,7 +255,7 @@ def test_a_frame_shows_the_times_of_its_steps(unit: Harness) -> None:
 
 
 @pytest.mark.parametrize("profile", ["extended"])
-def test_every_step_is_one_that_the_processing_measures(lit: Harness, sky: Sky) -> None:
+def test_every_reported_step_time_is_measured(lit: Harness, sky: Sky) -> None:
     lit.command("CaptureAndProcess")
     lit.command("setIDMode", IdMode=IdMode.TRACKING)
     x, y, z = sky.attitude.inv().as_matrix()[:, 2]

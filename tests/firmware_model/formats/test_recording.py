@@ -28,7 +28,7 @@ SETUPS = st.builds(Setup, TEXTS, st.just(""), st.integers(0, 2**40), DOCUMENTS, 
 
 
 @given(st.lists(EVENTS, max_size=8), st.none() | SETUPS)
-def test_what_is_written_is_read(tmp_path_factory, events, setup):
+def test_recording_events_round_trip(tmp_path_factory, events, setup):
     stream = io.StringIO()
     writer = recording.RecordingWriter(stream, "cubestar", {"uart": 57_600}, setup)
     for event in events:
@@ -68,7 +68,7 @@ def test_rejects_files_that_are_not_recordings(tmp_path, text, reason):
     assert "some.rec" in str(raised.value)
 
 
-def test_a_part_ends_with_what_begins_at_its_end():
+def test_recording_until_a_time_includes_events_at_that_time():
     begun = [recording.LineError(time_ps, "uart") for time_ps in (5, 10, 11)]
     whole = recording.Recording("a", "cubestar", events=tuple(begun))
     for end_ps, count in ((4, 0), (10, 2), (11, 3)):
@@ -106,7 +106,7 @@ def exchanged(*exchanges: tuple[bytes, bytes], port: str = "uart") -> Recording:
 
 
 @given(st.binary(max_size=12), st.binary(max_size=6).map(encode_frame))
-def test_offset_of_every_payload_byte(payload, before):
+def test_payload_offset_follows_the_encoder(payload, before):
     """Oracle: where the encoder puts each byte, one by one."""
     wire, position = before + encode_frame(payload), len(before) + 2
     for offset, byte in enumerate(payload):
@@ -151,7 +151,7 @@ def test_bench_letter_is_named():
         assert name.endswith(f"answer to letter '{letter}'")
 
 
-def test_request_byte_is_named():
+def test_request_bytes_are_named_after_message_fields():
     wire = encode_frame(b"\x80") + encode_frame(bytes([20, 1, 0]))
     names = [byte_names.name_request_byte(INTERFACE, wire, index, "uart") for index in (7, 8, 9, 5)]
     assert names[0].endswith("the ID")
@@ -168,7 +168,7 @@ def test_request_byte_is_named():
         (0x1C, 0x00, 0, "register SUN_THRESHOLD"),
     ],
 )
-def test_bus_byte_is_named(address, pointer, index, name):
+def test_bus_bytes_are_named_after_messages_and_registers(address, pointer, index, name):
     sent, read = bytes([pointer]), bytes(8)
     messages = BusMessage(address, sent, read=False), BusMessage(address, read, read=True)
     transfer = BusTransfer(0, "i2c", 1, messages)

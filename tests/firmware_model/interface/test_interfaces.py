@@ -55,12 +55,12 @@ def test_error_codes_are_listed_once(interface: Interface) -> None:
         ("inout", [Port("X_I", False, 2, 3), Port("X_O", True, 2), Port("X_OE", True, 1)]),
     ],
 )
-def test_ports(direction: Direction, ports: list[Port]) -> None:
+def test_pin_direction_defines_its_ports(direction: Direction, ports: list[Port]) -> None:
     """The level is an input's, or that of an output that is never off."""
     assert list(Pin("X", direction, "", 2, level=3).ports) == ports
 
 
-def test_what_changes_keeps_the_rest() -> None:
+def test_pin_copy_keeps_unchanged_attributes() -> None:
     pin = Pin("X", "inout", "a bus", 8, level=7, enables=8, bare=True)
     other = pin.copy("Y", meaning="another bus", width=4)
     assert [port.name for port in other.ports] == ["Y_I", "Y", "Y_OE"]
@@ -68,7 +68,7 @@ def test_what_changes_keeps_the_rest() -> None:
     assert [port.name for port in pin.copy(width=4).ports] == ["X_I", "X", "X_OE"]
 
 
-def test_pin_is_its_name_and_keeps_its_details() -> None:
+def test_pin_equals_its_name_and_keeps_its_details_when_copied() -> None:
     pin = Pin("X", "input", "a pin")
     assert pin == "X"
     assert {"X": 1}[pin] == 1
@@ -77,7 +77,7 @@ def test_pin_is_its_name_and_keeps_its_details() -> None:
         assert (same, same.meaning, same.ports) == ("X", "a pin", pin.ports)
 
 
-def test_resized() -> None:
+def test_resized_pins_have_the_given_width() -> None:
     address, *others = resized(sram_pins(20), SRAM_A=7)
     assert address.width == 7
     assert [pin.width for pin in others] == [8, 1, 1, 1]
@@ -92,7 +92,7 @@ TABLES = {
 
 
 @pytest.mark.parametrize("name", TABLES)
-def test_no_pin_and_no_port_is_there_twice(name: str) -> None:
+def test_pins_and_ports_are_unique(name: str) -> None:
     table: tuple[Pin, ...] = TABLES[name]
     assert len(set(table)) == len(table)
     ports = [port.name for pin in table for port in pin.ports]

@@ -29,14 +29,14 @@ def test_charges_add_up_by_count_and_cost() -> None:
 
 
 @pytest.mark.parametrize("table", TABLES, ids=lambda table: table.name)
-def test_no_price_changes_unnoticed(table: CostTable) -> None:
+def test_operation_costs_equal_the_recorded_ones(table: CostTable) -> None:
     """Each operation as often as it takes cycles."""
     meter = Meter(table)
     meter.charge(**table.cycles)
     as_on_record(f"prices: {table.name}", meter)
 
 
-def test_take_gives_the_cycles_since_the_last_take() -> None:
+def test_take_returns_the_cycles_since_the_last_take() -> None:
     meter = Meter(SIMPLE)
     meter.charge(add=1)
     assert meter.take() == 3
@@ -46,7 +46,7 @@ def test_take_gives_the_cycles_since_the_last_take() -> None:
     assert meter.total == 13
 
 
-def test_book_counts_without_a_debt() -> None:
+def test_elapsed_charges_are_counted_but_not_taken() -> None:
     meter = Meter(SIMPLE)
     meter.charge(loop=3)
     with meter.phase("search"):
@@ -56,7 +56,7 @@ def test_book_counts_without_a_debt() -> None:
     assert [meter.take(), meter.take()] == [15, 0]
 
 
-def test_unknown_operation_is_named_and_nothing_of_it_is_counted() -> None:
+def test_unknown_operation_is_reported_and_not_counted() -> None:
     with pytest.raises(CostError, match=r"'f64_add' is not in the table of simple part.*add, loop"):
         Meter(SIMPLE).charge(f64_add=1)
 
@@ -66,7 +66,7 @@ def test_rejects_negative_counts() -> None:
         Meter(SIMPLE).charge(add=-1)
 
 
-def test_phases_split_the_total() -> None:
+def test_meter_phases_split_the_total() -> None:
     meter = Meter(SIMPLE)
     with meter.phase("search"):
         meter.charge(loop=4)
@@ -80,7 +80,7 @@ def test_phases_split_the_total() -> None:
     assert meter.total == 333
 
 
-def test_all_phases_at_once_are_as_one_by_one() -> None:
+def test_charge_all_equals_charging_each_phase_separately() -> None:
     phases = {"search": {"add": 4, "loop": 1}, "sort": {"loop": 3}, "none": {}}
     one, other = Meter(SIMPLE), Meter(SIMPLE)
     for meter in (one, other):
@@ -117,19 +117,21 @@ def test_phase_ends_when_its_block_fails() -> None:
         (1, "measured", "", "needs a source"),
     ],
 )
-def test_rejects_doubtful_costs(cycles: int, provenance: str, source: str, message: str) -> None:
+def test_rejects_costs_without_valid_cycles_provenance_or_source(
+    cycles: int, provenance: str, source: str, message: str
+) -> None:
     with pytest.raises(CostError, match=message):
         Cost(cycles, provenance, source)  # type: ignore[arg-type]
 
 
-def test_the_transfer_loop_is_the_only_fitted_cost_and_reproduces_its_anchor() -> None:
+def test_transfer_loop_is_the_only_fitted_cost_and_takes_404_ms() -> None:
     fitted = {n: c for n, c in CORTEX_M3.operations.items() if c.provenance == "fitted"}
     assert set(fitted) == {"transfer_byte"}
     duration = CORTEX_M3.seconds(fitted["transfer_byte"].cycles * 1024 * 512)
     assert duration == pytest.approx(0.404, abs=0.0005)
 
 
-def test_what_a_compiler_made_depends_on_build_and_waits() -> None:
+def test_cortex_m3_costs_depend_on_build_and_memory_timing() -> None:
     usual, doubles = CORTEX_M3.operations, cortex_m3(build="-O2 double").operations
     quick = cortex_m3(timing="0 flash waits, cache, bus 1-1-3-0").operations
     assert usual["f32_add"].provenance == "measured"
@@ -144,20 +146,20 @@ def test_what_a_compiler_made_depends_on_build_and_waits() -> None:
 # --- Blackfin -------------------------------------------------------------------------------------
 
 
-def test_clock_and_memory_speed() -> None:
+def test_flash_read_cost_follows_the_clock_frequency() -> None:
     assert BLACKFIN_BF533.clock_hz == CORE_HZ
     # 70 ns are 9 clocks of a bus of 120 MHz, 5 of one of 60 MHz; two more frame them.
     assert BLACKFIN_BF533.operations["flash_read"].cycles == 5 * 11
     assert blackfin_bf533(clock_hz=300_000_000).operations["flash_read"].cycles == 5 * 7
 
 
-def test_nothing_is_fitted_and_everything_is_explained() -> None:
+def test_blackfin_costs_are_published_or_assumed_with_a_source() -> None:
     tags = {cost.provenance for cost in BLACKFIN_BF533.operations.values()}
     assert tags == {"published", "assumed"}
     assert all(cost.source for cost in BLACKFIN_BF533.operations.values())
 
 
-def test_every_float_operation_of_the_other_star_tracker_is_there() -> None:
+def test_blackfin_costs_include_every_float_operation_of_the_cortex_m3() -> None:
     floats = {name for name in CORTEX_M3.operations if re.match("f32|i32", name)}
     assert floats <= set(BLACKFIN_BF533.operations)
 
@@ -165,11 +167,11 @@ def test_every_float_operation_of_the_other_star_tracker_is_there() -> None:
 # --- PIC18 ----------------------------------------------------------------------------------------
 
 
-def test_nothing_is_fitted_to_a_published_time() -> None:
+def test_pic18_costs_are_not_fitted() -> None:
     assert not [n for n, c in pic18.PIC18F45K20.operations.items() if c.provenance == "fitted"]
 
 
-def test_costs_have_the_order_common_to_all_libraries() -> None:
+def test_float_operation_costs_rise_from_convert_to_atan2() -> None:
     cycles = {name: cost.cycles for name, cost in pic18.PIC18F45K20.operations.items()}
     order = ["convert", "mul", "div", "sqrt", "atan2"]
     assert [cycles[f"f32_{name}"] for name in order] == sorted(
@@ -178,12 +180,12 @@ def test_costs_have_the_order_common_to_all_libraries() -> None:
     assert cycles["strobe_byte"] < cycles["scan_byte"]
 
 
-def test_the_instruction_clock_is_that_of_the_published_timer_formula() -> None:
+def test_pic18_clock_follows_the_published_timer_formula() -> None:
     # 4 tenths of the timer's period at the prescaler of 256, CubeSense thesis, equation 7.4.1
     assert pic18.PIC18F45K20.seconds(256 * 1000) == pytest.approx(1000 * 256 / 5e6)
 
 
-def test_pages_keep_what_was_written_last_and_their_writes_are_counted() -> None:
+def test_flash_pages_keep_the_last_data_and_count_writes() -> None:
     flash = FlashStore()
     data = bytearray(b"12")
     for page, contents in (("a", b"0"), ("b", b"2"), ("a", data)):

@@ -198,21 +198,21 @@ def test_rejects_unknown_telecommand(node: Node, unit: Any) -> None:
     assert not unit.queue
 
 
-def test_a_frame_longer_than_any_telecommand(node: Node, unit: Any) -> None:
+def test_frame_longer_than_any_telecommand_is_refused(node: Node, unit: Any) -> None:
     for length in (1, 2, 1000):
         data = good(node).ljust(longest_command(node.interface) + length, b"\0")
         assert unit.frames(data) == ack(AckError.WRONG_LENGTH)
     assert unit.state.flags == flags(node, "uart_many")
 
 
-def test_a_write_beyond_the_longest_telecommand_is_not_acknowledged(node: Node, unit: Any) -> None:
+def test_write_longer_than_any_telecommand_is_not_acknowledged(node: Node, unit: Any) -> None:
     longest = longest_command(node.interface)
     assert unit.i2c_write(good(node).ljust(longest + 50, b"\0")) == longest + 1
     assert unit.state.flags == flags(node, "i2c_many")
     assert not unit.queue
 
 
-def test_rejects_bad_parameter(node: Node, unit: Any) -> None:
+def test_telecommand_with_a_bad_parameter_is_refused(node: Node, unit: Any) -> None:
     name, values = node.refused
     assert unit.send(name, **values) == AckError.BAD_PARAMETER
     assert unit.state.flags == flags(node, "parameter")
@@ -237,7 +237,7 @@ def test_full_buffer_rejects_telecommands(node: Node, unit: Any, bus: str) -> No
     assert unit.frames(data) == ack(AckError.OK)
 
 
-def test_a_telecommand_that_a_repeated_start_ends(node: Node, unit: Any) -> None:
+def test_repeated_start_ends_a_telecommand(node: Node, unit: Any) -> None:
     unit.link.i2c_start(False)
     for byte in good(node):
         unit.link.i2c_write(byte)
@@ -256,7 +256,7 @@ def test_every_telemetry_frame_answers_on_both_buses(node: Node, message: Messag
     assert not unit.state.flags
 
 
-def test_an_unknown_telemetry_id_gets_no_answer(node: Node, unit: Any) -> None:
+def test_unknown_telemetry_id_gets_no_answer(node: Node, unit: Any) -> None:
     known = {message.id for message in node.interface.telemetries if message.supported}
     unknown = [identifier for identifier in range(128, 256) if identifier not in known]
     for identifier in unknown:
@@ -267,12 +267,12 @@ def test_an_unknown_telemetry_id_gets_no_answer(node: Node, unit: Any) -> None:
     assert unit.state.flags == flags(node, "unknown_telemetry_read")
 
 
-def test_reading_without_an_id(node: Node, unit: Any) -> None:
+def test_i2c_read_without_an_id_returns_ff_and_sets_a_flag(node: Node, unit: Any) -> None:
     assert unit.i2c_read(3) == b"\xff\xff\xff"
     assert unit.state.flags == flags(node, "no_id")
 
 
-def test_an_answer_can_be_fetched_in_another_transfer_but_only_once(node: Node, unit: Any) -> None:
+def test_i2c_answer_is_readable_once_in_another_transfer(node: Node, unit: Any) -> None:
     assert unit.i2c_write(b"\x80") == 1
     assert unit.i2c_read(8) == unit.frames(b"\x80")[0]
     assert not unit.state.flags
@@ -300,13 +300,15 @@ def test_answers_that_the_send_buffer_has_no_room_for_are_dropped(node: Node, un
         (b"\x1f\x7f\x07\x05", "incomplete"),  # ended by the next frame's start
     ],
 )
-def test_a_good_frame_behind_a_bad_one(node: Node, unit: Any, noise: bytes, name: str) -> None:
+def test_good_frame_after_a_bad_one_is_acknowledged(
+    node: Node, unit: Any, noise: bytes, name: str
+) -> None:
     assert unit.uart(noise + encode_frame(good(node))) == ack(AckError.OK)
     assert unit.state.flags == flags(node, name)
     assert len(unit.queue) == 1
 
 
-def test_half_a_frame_and_silence(node: Node, unit: Any) -> None:
+def test_silence_after_half_a_frame_sets_the_time_out_flag(node: Node, unit: Any) -> None:
     unit.link.uart_silence()
     assert not unit.state.flags  # silence between frames is no error
     half = encode_frame(good(node))[:-1]  # ends in an escape, which would swallow the next start

@@ -97,7 +97,7 @@ def test_telecommands_are_executed_one_after_the_other(node: Node) -> None:
     assert node.telemetry("TcmdProcessed")["Processed"] == 1
 
 
-def test_a_telecommand_without_an_action_is_a_setting(node: Node) -> None:
+def test_telecommand_without_an_action_changes_a_setting(node: Node) -> None:
     assert node.telemetry("Settings") == {"Level": 7}
     node.command("SetLevel", Level=200)
     assert node.telemetry("Settings") == {"Level": 200}
@@ -124,7 +124,7 @@ def test_full_queue_rejects_telecommands(node: Node) -> None:
     assert node.telemetry("ErrorFlags")["TcmdBufferOverflow"]
 
 
-def test_own_flags_rise_and_are_cleared(node: Node) -> None:
+def test_node_flags_are_raised_and_cleared(node: Node) -> None:
     node.command("Work", Amount=9)
     node.command("Work", Amount=1)
     assert node.telemetry("ErrorFlags")["Overdone"]
@@ -132,7 +132,7 @@ def test_own_flags_rise_and_are_cleared(node: Node) -> None:
     assert not any(node.telemetry("ErrorFlags").values())
 
 
-def test_a_reset_forgets_all_but_the_time(node: Node) -> None:
+def test_reset_restores_defaults_but_keeps_the_runtime(node: Node) -> None:
     node.command("SetLevel", Level=1)
     node.now_us = 2_345_000
     node.command("Reset")
@@ -143,7 +143,7 @@ def test_a_reset_forgets_all_but_the_time(node: Node) -> None:
     assert (identification["RuntimeSeconds"], identification["RuntimeMilliseconds"]) == (2, 345)
 
 
-def test_both_buses_carry_the_same(node: Node) -> None:
+def test_uart_and_i2c_carry_the_same_messages(node: Node) -> None:
     node.i2c_write(bytes([10, 4]))
     Runner.run(node)
     assert node.i2c_read(3, 140) == bytes([4, 0, 255])
@@ -166,7 +166,7 @@ def exchanges(page: str) -> list[tuple[str, str]]:
     ("page", "power_on", "pause_us"),
     [("protocols.md", CubeStar, None), ("protocols-cubesense.md", lambda _: CubeSense(), NEXT_US)],
 )
-def test_examples_of_the_page(
+def test_documented_protocol_examples_work(
     page: str,
     power_on: Callable[[StarCatalogue], CubeStar | CubeSense],
     pause_us: int | None,

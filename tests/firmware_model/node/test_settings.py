@@ -28,14 +28,14 @@ def change(settings: Settings, interface: Interface, commands: tuple[str, ...], 
         settings.put(name, message.unpack(rng.bytes(message.length)))
 
 
-def test_they_start_with_the_declared_reset_values(node, settings: Settings) -> None:
+def test_settings_start_with_the_declared_reset_values(node, settings: Settings) -> None:
     interface, commands = node
     for name in commands:
         assert settings.all(name) == interface.telecommand(name).reset_values()
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_packed_settings_come_back_bit_by_bit(node, settings: Settings, seed: int) -> None:
+def test_packed_settings_round_trip(node, settings: Settings, seed: int) -> None:
     change(settings, *node, seed)
     packed = settings.pack()
     assert len(packed) == settings.size()
@@ -44,7 +44,7 @@ def test_packed_settings_come_back_bit_by_bit(node, settings: Settings, seed: in
     assert restored.pack() == packed
 
 
-def test_they_are_stored_as_the_parameter_bytes_of_the_telecommands(node, settings) -> None:
+def test_settings_are_stored_as_telecommand_parameter_bytes(node, settings) -> None:
     change(settings, *node, 1)
     interface, commands = node
     parts = [interface.telecommand(name).pack(**settings.all(name)) for name in commands]
@@ -59,7 +59,7 @@ def test_clearing_returns_to_the_reset_values(node, settings: Settings) -> None:
     assert settings.pack() == Settings(*node).pack()
 
 
-def test_some_of_them_are_restored_and_no_others(node, settings: Settings) -> None:
+def test_selected_settings_are_restored_and_no_others(node, settings: Settings) -> None:
     name = node[1][0]
     change(settings, *node, 3)
     restored = Settings(*node)
@@ -68,7 +68,7 @@ def test_some_of_them_are_restored_and_no_others(node, settings: Settings) -> No
     assert restored.pack(*node[1][1:]) == Settings(*node).pack(*node[1][1:])
 
 
-def test_one_telecommand_s_parameters_are_copied_in_and_out() -> None:
+def test_settings_copy_parameters_in_and_out() -> None:
     settings, fresh = (Settings(CUBESTAR, CUBESTAR_SETTINGS) for _ in range(2))
     values = {"exposure": 5}
     settings.put("Exposure", values)

@@ -115,7 +115,7 @@ def skies(listed: StarCatalogue, count: int, seed: int) -> list[tuple[Sky, NDArr
     return shown
 
 
-def test_pictures_give_the_same_bits_from_centroid_to_attitude(
+def test_c_processing_returns_the_same_bits_from_centroid_to_attitude(
     program: Algorithms, listed: StarCatalogue, camera: CameraParameters
 ) -> None:
     settings = Settings(INTERFACE, SETTING_COMMANDS)
@@ -136,7 +136,7 @@ def test_pictures_give_the_same_bits_from_centroid_to_attitude(
 
 
 @pytest.mark.parametrize("seed", quick(range(12), 4))
-def test_random_blobs_meet_every_limit_alike(program: Algorithms, seed: int) -> None:
+def test_c_and_python_detection_agree_on_random_blobs(program: Algorithms, seed: int) -> None:
     rng = np.random.default_rng(seed)
     picture = rng.integers(0, rng.integers(6, 40), (512, 1024)).astype(np.uint8)
     picture[picture < rng.integers(4, 40)] = rng.integers(0, 3)
@@ -167,7 +167,7 @@ def test_random_blobs_meet_every_limit_alike(program: Algorithms, seed: int) -> 
     assert_same_detection(program.detect(picture, config), expected)
 
 
-def test_random_centroids_have_the_same_identities(
+def test_c_and_python_identification_agree_on_random_centroids(
     program: Algorithms, listed: StarCatalogue, camera: CameraParameters
 ) -> None:
     rng = np.random.default_rng(7)
@@ -212,7 +212,7 @@ def test_random_centroids_have_the_same_identities(
     assert outcomes == set(OUTCOMES)
 
 
-def test_nan_is_handled_alike(program: Algorithms, listed: StarCatalogue) -> None:
+def test_c_and_python_handle_nan_the_same_way(program: Algorithms, listed: StarCatalogue) -> None:
     vectors = np.array([[np.nan] * 3, [0, 0, 1], [0.1, 0, 0.995]], np.float32)
     expected = identify(vectors, listed, METER)
     assert_same_identities(program.identify(vectors, None, 0.001), expected)
@@ -221,7 +221,7 @@ def test_nan_is_handled_alike(program: Algorithms, listed: StarCatalogue) -> Non
         assert_same_identities(found, unidentified(nothing, MatchOutcome.TOO_FEW_CENTROIDS))
 
 
-def test_attitudes_without_an_answer_are_refused_alike(program: Algorithms) -> None:
+def test_c_and_python_quest_refuse_the_same_inputs(program: Algorithms) -> None:
     axis = np.array([[0, 0, 1]], np.float32)
     for measured, weights in (
         (np.repeat(axis, 3, 0), [1, 1, 1]),
@@ -233,7 +233,7 @@ def test_attitudes_without_an_answer_are_refused_alike(program: Algorithms) -> N
         assert program.quest(measured, measured, np.array(weights, np.float32)) is None
 
 
-def test_attitudes_of_every_turn_have_the_same_bits(program: Algorithms) -> None:
+def test_c_quest_returns_the_same_bits_as_python(program: Algorithms) -> None:
     rng = np.random.default_rng(3)
     turns = [*Rotation.random(300, rng=rng), *Rotation.from_rotvec(np.pi * np.eye(3))]
     for turn in turns:
@@ -248,7 +248,7 @@ def test_attitudes_of_every_turn_have_the_same_bits(program: Algorithms) -> None
         assert bits(found) == bits(expected)
 
 
-def test_functions_and_directions_have_the_same_bits(program: Algorithms) -> None:
+def test_c_functions_and_directions_return_the_same_bits(program: Algorithms) -> None:
     rng = np.random.default_rng(11)
     for x in np.concatenate([rng.uniform(-1, 1, 2000), [1, -1, 0, 0.5, -0.5]]).astype("f4"):
         assert bits(program.call("arc_cosine", x)) == bits(float_functions.arc_cosine(x))
@@ -261,7 +261,7 @@ def test_functions_and_directions_have_the_same_bits(program: Algorithms) -> Non
         assert bits(program.angles_of(direction)) == bits(geometry.angles_of(direction, METER))
 
 
-def test_stars_near_a_direction_are_counted_alike(
+def test_c_and_python_count_the_same_stars_near_a_direction(
     program: Algorithms, listed: StarCatalogue, camera: CameraParameters
 ) -> None:
     edge = field_cosine(camera)

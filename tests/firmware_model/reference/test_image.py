@@ -16,12 +16,14 @@ ROOT = Path(__file__).parents[3]
 LARGEST = 1 << 20
 
 
-def test_the_image_is_as_recorded() -> None:
+def test_reference_firmware_image_is_as_recorded() -> None:
     assert reference_image() == IMAGE
     assert IMAGE.stat().st_size < LARGEST
 
 
-def test_rejects_another_image(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_rejects_an_image_that_differs_from_the_record(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     other = tmp_path / IMAGE.name
     other.write_bytes(IMAGE.read_bytes()[:-1])
     shutil.copy(IMAGE.with_suffix(".json"), other.with_suffix(".json"))
@@ -34,7 +36,7 @@ def test_rejects_another_image(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 
 
 @pytest.mark.slow
-def test_the_sources_make_the_image(tmp_path: Path) -> None:
+def test_sources_compile_to_the_recorded_firmware_image(tmp_path: Path) -> None:
     compiler = shutil.which("arm-none-eabi-gcc")
     if compiler is None or shutil.which("make") is None:
         pytest.skip("arm-none-eabi-gcc is not installed")

@@ -73,7 +73,7 @@ def _packed(library: CDLL, field: Field, value: float) -> int:
 
 
 @pytest.mark.parametrize("message", INTERFACE.telemetries, ids=lambda message: message.name)
-def test_telemetry_is_packed_as_the_codec_packs_it(library: CDLL, message: Message) -> None:
+def test_c_reference_packs_telemetry_like_the_python_codec(library: CDLL, message: Message) -> None:
     rng = np.random.default_rng(message.id)
     for field in message.fields:
         if field.type.startswith("bytes"):
@@ -104,7 +104,9 @@ def _parameters(message: Message, rng: np.random.Generator) -> bytes:
 
 
 @pytest.mark.parametrize("message", INTERFACE.telecommands, ids=lambda message: message.name)
-def test_parameters_are_refused_as_the_table_refuses_them(library: CDLL, message: Message) -> None:
+def test_c_reference_refuses_the_same_parameters_as_the_table(
+    library: CDLL, message: Message
+) -> None:
     flags = {field.flag: field.bit_offset for field in INTERFACE.telemetry("ErrorFlags").fields}
     command = library.telecommand_of(message.id)
     assert (command[0], command[1]) == (message.id, message.length)
@@ -118,7 +120,7 @@ def test_parameters_are_refused_as_the_table_refuses_them(library: CDLL, message
         assert raised == {flags[flag] if flag else NO_FLAG for _, flag in refusals}, data.hex()
 
 
-def test_ids_are_known_as_the_table_knows_them(library: CDLL) -> None:
+def test_c_reference_knows_the_same_message_ids(library: CDLL) -> None:
     for identifier in range(256):
         message = INTERFACE.find(identifier)
         look_up = library.telemetry_of if identifier & 0x80 else library.telecommand_of
@@ -129,7 +131,9 @@ def test_ids_are_known_as_the_table_knows_them(library: CDLL) -> None:
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_any_bytes_are_decoded_as_the_codec_decodes_them(library: CDLL, seed: int) -> None:
+def test_c_decoder_decodes_arbitrary_bytes_like_the_python_decoder(
+    library: CDLL, seed: int
+) -> None:
     rng = np.random.default_rng(seed)
     stream = rng.choice([0x1F, 0x1F, 0x7F, 0xFF, 0x00, 0x42], 3000).astype(np.uint8)
     if seed % 2:  # long frames as well

@@ -22,7 +22,7 @@ def test_consecutive_values_form_range(allowed: set[int], expected: list[tuple[i
     assert tables._ranges(9, lambda raw: raw in allowed) == expected
 
 
-def test_ranges_that_a_field_depends_on_cover_all_values() -> None:
+def test_dependent_field_ranges_cover_all_values() -> None:
     """Of the other field, one behind the other, each with what the table allows."""
     message = INTERFACE.telecommand("ImageBlockSet")
     field = message.field("BlockNumber")
@@ -38,12 +38,12 @@ def test_ranges_that_a_field_depends_on_cover_all_values() -> None:
                 assert any(a <= number <= b for a, b in ranges) == allowed, (size, number)
 
 
-def test_limits_are_written_as_c() -> None:
+def test_reference_tables_write_limits_as_c_literals() -> None:
     bounds = [tables._bound(limit) for limit in (-math.inf, math.inf, 5, 0.1)]
     assert bounds == ["-INFINITY", "INFINITY", "5.0f", "0.1f"]
 
 
-def test_a_field_that_may_have_any_value_has_no_rule() -> None:
+def test_reference_tables_have_no_rule_for_unlimited_fields() -> None:
     ranges: list[str] = []
     assert list(tables._rules(INTERFACE.telecommand("Exposure"), ranges)) == []
     (rule,) = tables._rules(INTERFACE.telecommand("WriteTo_IS_Register"), ranges)
@@ -51,7 +51,7 @@ def test_a_field_that_may_have_any_value_has_no_rule() -> None:
     assert ranges == ["    {0, 0},"]
 
 
-def test_fields_that_stand_in_order_have_a_rule_with_their_size_and_places() -> None:
+def test_ordered_fields_have_a_reference_rule_with_size_and_offsets() -> None:
     ordered = 0
     for message in INTERFACE.telecommands:
         rules = [rule for rule in tables._rules(message, []) if rule.startswith("{RULE_ORDER")]
@@ -63,7 +63,9 @@ def test_fields_that_stand_in_order_have_a_rule_with_their_size_and_places() -> 
     assert ordered == 3  # a region along both axes, and the sizes of an area
 
 
-def test_every_rule_finds_its_ranges_in_the_table(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_reference_rules_point_to_their_rows_of_the_range_table(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """Rules of a list point at the rows of one table, one behind the other up to its end."""
     monkeypatch.setattr(tables, "_ranges", lambda last, _allowed: [(0, 5), (7, last)])
     text = tables.source()

@@ -30,7 +30,7 @@ def of(picture: NDArray[np.uint8], step: int = 4, smooth: bool = False) -> SkyBa
     return sky.smoothed() if smooth else sky
 
 
-def test_a_plane_is_interpolated_and_continued() -> None:
+def test_background_interpolates_and_extrapolates_a_plane() -> None:
     plane = (3 * X + 7 * Y) * UNIT // 8
     cells = plane[16::32, 16::32]
     sky = SkyBackground(cells, cells)
@@ -40,7 +40,9 @@ def test_a_plane_is_interpolated_and_continued() -> None:
 @BOTH
 @pytest.mark.parametrize("sigma", [0.7, 1.5, 4.0, 9.0])
 @pytest.mark.parametrize("slope", [0.0, 60.0])
-def test_level_and_noise_of_the_sky(sigma: float, slope: float, step: int, smooth: bool) -> None:
+def test_background_level_and_noise_are_measured_despite_stars(
+    sigma: float, slope: float, step: int, smooth: bool
+) -> None:
     rng = np.random.default_rng(4)
     ramp = slope * np.arange(512)[:, None] / 512
     image = 40.5 + ramp + rng.normal(0, sigma, SHAPE)
@@ -58,7 +60,7 @@ def test_level_and_noise_of_the_sky(sigma: float, slope: float, step: int, smoot
 
 
 @BOTH
-def test_a_bright_area_is_its_own_background(step: int, smooth: bool) -> None:
+def test_background_of_a_bright_half_is_the_bright_level(step: int, smooth: bool) -> None:
     picture = np.zeros(SHAPE, np.uint8)
     picture[:, 512:] = 255
     sky = of(picture, step, smooth)
@@ -66,7 +68,7 @@ def test_a_bright_area_is_its_own_background(step: int, smooth: bool) -> None:
     assert np.array_equal(np.unique(sky.levels), [0, 255 * UNIT])
 
 
-def test_a_spot_that_fills_a_cell_is_smoothed_away() -> None:
+def test_smoothing_removes_a_spot_that_fills_a_background_cell() -> None:
     picture = np.full((160, 160), 9, np.uint8)
     picture[64:96, 64:96] = 200
     assert of(picture).levels[2, 2] == 200 * UNIT
@@ -75,7 +77,7 @@ def test_a_spot_that_fills_a_cell_is_smoothed_away() -> None:
 
 @pytest.mark.parametrize("shape", [(20, 20), (32, 33), (100, 41)])
 @pytest.mark.parametrize("step", [2, 4])
-def test_any_region_has_cells_enough(shape: tuple[int, int], step: int) -> None:
+def test_background_cells_cover_any_region_size(shape: tuple[int, int], step: int) -> None:
     down, across = sample_offsets(*shape, step)
     assert (down.max(), across.max()) < (shape[0], shape[1])
     sky = of(np.full(shape, 9, np.uint8), step)
@@ -85,7 +87,7 @@ def test_any_region_has_cells_enough(shape: tuple[int, int], step: int) -> None:
     assert np.all(sky.interpolated(sky.levels, y, x) == 9 * UNIT)
 
 
-def test_brighter_pixels_exceed_noise_and_least_difference() -> None:
+def test_brighter_pixels_exceed_both_noise_and_minimum_difference() -> None:
     cells = np.full((4, 4), 10 * UNIT)
     sky = SkyBackground(cells, np.full((4, 4), 2 * UNIT))
     picture = np.full((4 * CELL, 4 * CELL), 18, np.uint8)

@@ -31,7 +31,7 @@ def rays(rng: np.random.Generator, count: int) -> NDArray[np.float32]:
     return (plane / np.linalg.norm(plane, axis=1, keepdims=True)).astype(np.float32)
 
 
-def test_stars_are_matched_as_by_trying_all() -> None:
+def test_star_matching_equals_brute_force() -> None:
     rng = np.random.default_rng(1)
     for count in (0, 1, 30):
         measured, predicted = rays(rng, count), rays(rng, 40)
@@ -66,7 +66,7 @@ def test_false_alarm_rate_is_at_most_the_declared_one() -> None:
         assert as_good <= level
 
 
-def test_evidence_for_and_against_an_attitude() -> None:
+def test_false_alarm_falls_with_found_and_rises_with_missing_stars() -> None:
     more_found = [false_alarm(1.0, 10, f, 1e-3, meter()) for f in range(1, 11)]
     assert all(b < a for a, b in pairwise(more_found))
     more_missing = [false_alarm(1.0, 2 + m, 2, 1e-3, meter()) for m in range(10)]
@@ -76,7 +76,7 @@ def test_evidence_for_and_against_an_attitude() -> None:
 
 
 @pytest.mark.parametrize("with_scale", [False, True])
-def test_a_correction_brings_both_together(with_scale: bool) -> None:
+def test_correction_rotates_and_scales_measured_onto_predicted_vectors(with_scale: bool) -> None:
     rng = np.random.default_rng(2)
     predicted = rays(rng, 8)
     turn = Rotation.from_rotvec(0.004 * rng.normal(size=3))
@@ -89,7 +89,7 @@ def test_a_correction_brings_both_together(with_scale: bool) -> None:
     assert factor == pytest.approx(1.004 if with_scale else 1.0, abs=2e-4)
 
 
-def test_three_stars_give_their_attitude() -> None:
+def test_attitude_from_three_stars_is_exact() -> None:
     rng = np.random.default_rng(3)
     for _ in range(20):
         truth, reference = Rotation.random(random_state=rng), rays(rng, 3)
@@ -98,7 +98,7 @@ def test_three_stars_give_their_attitude() -> None:
         assert (found * truth.inv()).magnitude() < 1e-4
 
 
-def test_another_focal_length_moves_stars_outward_alone() -> None:
+def test_longer_focal_length_moves_stars_radially_only() -> None:
     rng = np.random.default_rng(4)
     directions = rays(rng, 10)
     longer = scaled(directions, 1.03, meter())

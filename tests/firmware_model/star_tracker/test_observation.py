@@ -9,7 +9,7 @@ from cubestack.firmware_model.star_tracker.observation import so_few
 from ..cubestar.sky import meter, pinhole
 
 
-def test_the_part_of_the_sky_with_few_stars_is_not_underestimated() -> None:
+def test_probability_of_few_stars_is_not_underestimated() -> None:
     stars, view, counts = load_sky(mag_limit=3.8).vectors, pinhole(), []
     for attitude in Rotation.random(3000, random_state=1).as_matrix():
         camera = stars @ attitude.T

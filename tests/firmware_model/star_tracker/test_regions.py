@@ -8,7 +8,7 @@ from cubestack.firmware_model.star_tracker.regions import Moments, Runs
 
 
 @pytest.mark.parametrize("seed", range(30))
-def test_touching_runs_are_one_region_with_the_moments_of_its_pixels(seed: int) -> None:
+def test_touching_runs_form_one_region_with_its_moments(seed: int) -> None:
     rng = np.random.default_rng(seed)
     height, width = (int(size) for size in rng.integers(2, 60, 2))
     mask = rng.random((height, width)) < rng.uniform(0.05, 0.9)
@@ -40,7 +40,7 @@ def test_touching_runs_are_one_region_with_the_moments_of_its_pixels(seed: int) 
         assert found.across[region] == pytest.approx(across, abs=1e-6)
 
 
-def test_runs_lose_pixels() -> None:
+def test_pixels_can_be_removed_from_runs() -> None:
     mask = np.zeros((3, 20), np.bool_)
     mask[1, 2:9] = mask[2, 4] = True
     left = Runs.of(mask).without(np.array([22, 25, 26, 44]))

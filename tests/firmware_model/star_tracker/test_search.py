@@ -30,7 +30,7 @@ def near(boresight: NDArray[np.float64], deg: float, rng: np.random.Generator) -
     ("hint_deg", "false_stars", "least"),
     [(None, 0, 0.98), (None, 5, 0.98), (None, 20, 0.95), (5.0, 0, 0.98), (5.0, 20, 0.95)],
 )
-def test_solves_and_is_never_wrong(
+def test_search_solves_nearly_all_skies_and_is_never_wrong(
     tracker: Tracker, hint_deg: float | None, false_stars: int, least: float
 ) -> None:
     rng = np.random.default_rng((10 if hint_deg is None else 30) + false_stars)
@@ -42,7 +42,7 @@ def test_solves_and_is_never_wrong(
     assert solved >= least * 60
 
 
-def test_a_boresight_on_the_far_side_finds_nothing(tracker: Tracker) -> None:
+def test_hint_in_the_opposite_direction_identifies_nothing(tracker: Tracker) -> None:
     rng = np.random.default_rng(50)
     for _ in range(20):
         sky = tracker.sky(rng)
@@ -75,7 +75,7 @@ def test_rejects_too_few_stars(tracker: Tracker) -> None:
         assert found.stars.tolist() == [-1] * count
 
 
-def test_false_stars_never_turn_right_into_wrong(tracker: Tracker) -> None:
+def test_false_stars_never_change_an_identity(tracker: Tracker) -> None:
     rng = np.random.default_rng(82)
     for _ in range(20):
         sky = tracker.sky(rng)
@@ -86,7 +86,7 @@ def test_false_stars_never_turn_right_into_wrong(tracker: Tracker) -> None:
 
 
 @pytest.mark.parametrize("scale", [0.97, 0.995, 1.01, 1.03])
-def test_another_focal_length_is_measured(tracker: Tracker, scale: float) -> None:
+def test_identification_measures_the_focal_length_error(tracker: Tracker, scale: float) -> None:
     rng = np.random.default_rng(83)
     solved = 0
     for _ in range(12):
@@ -98,7 +98,7 @@ def test_another_focal_length_is_measured(tracker: Tracker, scale: float) -> Non
     assert solved >= (11 if abs(scale - 1) < 0.02 else 8)
 
 
-def test_a_believed_attitude_is_rated(tracker: Tracker) -> None:
+def test_identified_attitude_has_false_alarm_rate_and_scale(tracker: Tracker) -> None:
     rng = np.random.default_rng(94)
     for _ in range(10):
         sky = tracker.sky(rng)
@@ -117,7 +117,7 @@ def test_search_ends_within_its_time_limit(tracker: Tracker, count: int) -> None
     assert found.outcome in ("NO_TIME", "UNCONFIRMED")
 
 
-def test_two_stars_side_by_side_are_not_one(tracker: Tracker) -> None:
+def test_adjacent_stars_get_different_identities(tracker: Tracker) -> None:
     sky = tracker.sky(np.random.default_rng(99))
     known = int(np.flatnonzero(sky.stars != -1)[2])
     twin = sky.directions[known] + np.array([3e-4, 0, 0], np.float32)

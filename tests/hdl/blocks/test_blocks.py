@@ -23,7 +23,9 @@ CASES = [(name, *size) for name, (_, sizes) in BLOCKS.items() for size in sizes]
 
 @pytest.mark.parametrize("seed", quick([1, 2], 1))
 @pytest.mark.parametrize(("name", "columns", "rows"), quick(CASES, 3))
-def test_block(icarus: Any, name: str, columns: int, rows: int, seed: int) -> None:
+def test_block_passes_its_testbench_in_icarus(
+    icarus: Any, name: str, columns: int, rows: int, seed: int
+) -> None:
     block, _ = BLOCKS[name]
     icarus.run(block, columns, rows, f"tests.hdl.blocks.testbenches.{name}", seed=seed)
 
@@ -31,7 +33,9 @@ def test_block(icarus: Any, name: str, columns: int, rows: int, seed: int) -> No
 @pytest.mark.parametrize(
     ("columns", "rows", "bits"), [(2, 2, 2), (5, 3, 5), (8, 4, 5), (640, 480, 19), (1024, 512, 19)]
 )
-def test_address_width(columns: int, rows: int, bits: int) -> None:
+def test_matrix_counter_address_width_fits_columns_and_rows(
+    columns: int, rows: int, bits: int
+) -> None:
     assert MatrixCounter.address_width(columns, rows) == bits
 
 

@@ -23,7 +23,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_covered_points_are_not_missed(folder: Path) -> None:
+def test_merged_coverage_lists_only_missed_points(folder: Path) -> None:
     everything = [(name, point) for name, group in GROUPS.items() for point in group.points()]
     assert points.missed(points.merged(folder)) == everything
     for _ in range(2):
@@ -58,7 +58,7 @@ def test_every_row_of_the_table_is_declared() -> None:
             assert (side, str(action), state) in taken
 
 
-def test_document_has_the_same_groups() -> None:
+def test_documentation_lists_every_coverage_group() -> None:
     text = (HERE.parents[2] / "docs" / "gateware-tests.md").read_text(encoding="utf-8")
     for name, group in GROUPS.items():
         assert f"| {name} | {len(group.points())} | {group.meaning} |" in text

@@ -74,11 +74,11 @@ def scan_by_hand(size: ReadOut) -> list[tuple[int, int] | None]:
 
 
 @pytest.mark.parametrize("size", [FULL, SMALL])
-def test_declared_scan_is_the_listing_s(size: ReadOut) -> None:
+def test_declared_scan_matches_the_published_listing(size: ReadOut) -> None:
     assert list(size.scan()) == scan_by_hand(size)
 
 
-def test_start_columns() -> None:
+def test_as_flown_scan_starts_at_column_1() -> None:
     pixels = list(FULL.scan())
     assert pixels[:2] == [None, (1, 15)]
     assert pixels[640:642] == [(0, 79), (1, 79)]
@@ -86,7 +86,7 @@ def test_start_columns() -> None:
     assert pixels[-1] == (703, 0)  # behind the picture
 
 
-def test_scan_presents_what_is_declared() -> None:
+def test_nadir_scan_presents_the_declared_addresses() -> None:
     clocks = [{}] * (SMALL.scan_clocks - 1)
     addresses = simulated(NadirScan(SMALL), "scan", clocks, "address")
     places = [(a % 32, a // 32) for (a,) in addresses]
@@ -119,7 +119,9 @@ def lit(*places: tuple[int, int]) -> list[list[int]]:
         ([lit(), lit((9, 9))], (9, 9)),  # nothing changes without a bright pixel
     ],
 )
-def test_bright_pixels(pictures: list[list[list[int]]], place: tuple[int, int]) -> None:
+def test_as_flown_sun_search_notes_the_published_bright_pixel(
+    pictures: list[list[list[int]]], place: tuple[int, int]
+) -> None:
     assert found(*pictures) == place
 
 
@@ -131,7 +133,7 @@ def window(x: int, y: int) -> list[int]:
 
 
 @pytest.mark.parametrize("sun", [(8, 6), (1, 0), (20, 12), (0, 6)])
-def test_window_wraps(sun: tuple[int, int]) -> None:
+def test_as_flown_sun_window_wraps_at_the_image_border(sun: tuple[int, int]) -> None:
     left, top = SMALL.window_origin(*sun)
     assert (left, top) == (sun[0] - 2, sun[1] - 1)
     places = ((left + i) % 32 + 32 * ((top + j) % 16) for j in range(6) for i in range(5))

@@ -32,13 +32,15 @@ SEEDS = quick([1, 2], 1)
 
 @pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("name", NAMES)
-def test_pair(simulate: Any, read_out: ReadOut, name: str, seed: int) -> None:
+def test_cubesense_pair_passes_its_testbenches(
+    simulate: Any, read_out: ReadOut, name: str, seed: int
+) -> None:
     simulate(CubeSensePair, read_out, name, seed=seed)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
-def test_needs_no_initial_values(simulate: Any, seed: int) -> None:
+def test_cubesense_pair_needs_no_initial_values(simulate: Any, seed: int) -> None:
     """Standby alone sets the state: the parts' flip-flops power up at any level."""
     names = NAMES.copy()
     random.Random(seed).shuffle(names)
@@ -46,24 +48,26 @@ def test_needs_no_initial_values(simulate: Any, seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_addressing(simulate: Any, read_out: ReadOut, seed: int) -> None:
+def test_addressing_testbench_passes(simulate: Any, read_out: ReadOut, seed: int) -> None:
     simulate(addressable, read_out, "addressing", mcu_addressing=True, seed=seed)
 
 
 @pytest.mark.slow
-def test_addressing_at_full_size(simulate: Any) -> None:
+def test_addressing_testbench_passes_at_full_size(simulate: Any) -> None:
     simulate(addressable, FULL_SIZE, "addressing", mcu_addressing=True, seed=1)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("initialised", quick([False, True], 1))
-def test_addressing_changes_nothing_else(simulate: Any, initialised: bool) -> None:
+def test_other_testbenches_pass_with_the_addressing_option(
+    simulate: Any, initialised: bool
+) -> None:
     options = {"mcu_addressing": True, "initialised": initialised}
     simulate(addressable, SMALLEST, *NAMES, seed=1, **options)
 
 
 @pytest.mark.slow
-def test_full_size(simulate: Any) -> None:
+def test_cubesense_pair_passes_its_testbench_at_full_size(simulate: Any) -> None:
     harness = Path(__file__).with_name("cubesense_full_frame.v")
     simulate(CubeSensePair, FULL_SIZE, "full_size", seed=1, harness=harness)
 
@@ -95,13 +99,15 @@ BLOCKS: dict[str, Callable[[ReadOut], Component]] = {
 
 @pytest.mark.parametrize("seed", quick([1, 2], 1))
 @pytest.mark.parametrize("block", BLOCKS)
-def test_block(simulate: Any, read_out: ReadOut, block: str, seed: int) -> None:
+def test_cubesense_block_passes_its_testbench(
+    simulate: Any, read_out: ReadOut, block: str, seed: int
+) -> None:
     simulate(BLOCKS[block], read_out, block, name=block, seed=seed)
 
 
 @pytest.mark.parametrize("addressing", [False, True], ids=["published", "addressing"])
 @pytest.mark.parametrize("side", ["sun", "nadir"])
-def test_dataflow(simulate: Any, side: Any, addressing: bool) -> None:
+def test_dataflow_block_passes_its_testbench(simulate: Any, side: Any, addressing: bool) -> None:
     options = {"mcu_addressing": addressing, "side": side, "seed": 1}
     options["name"] = f"{side}_dataflow_{addressing}"
     make = partial(DataflowControl, side, mcu_addressing=addressing)
@@ -109,7 +115,7 @@ def test_dataflow(simulate: Any, side: Any, addressing: bool) -> None:
 
 
 @pytest.mark.parametrize("side", ["sun", "nadir"])
-def test_fpga_alone(simulate: Any, read_out: ReadOut, side: Any) -> None:
+def test_single_fpga_passes_its_testbench(simulate: Any, read_out: ReadOut, side: Any) -> None:
     options = {"name": f"{side}_fpga", "side": side, "seed": 1}
     simulate(partial(CubeSenseFpga, side), read_out, "fpga_alone", **options)
 
@@ -117,7 +123,7 @@ def test_fpga_alone(simulate: Any, read_out: ReadOut, side: Any) -> None:
 TABLES = FPGA, ADDRESSING
 
 
-def test_published_pins() -> None:
+def test_cubesense_fpgas_have_the_64_published_pins() -> None:
     assert sum(pin.width for pin in FPGA) == 64
     for fpga in (CubeSenseFpga("sun"), CubeSenseFpga("nadir", mcu_addressing=True)):
         rtlil_text(fpga)  # a design must be used, Amaranth says
@@ -125,14 +131,14 @@ def test_published_pins() -> None:
         assert {port.name for pin in fpga.pins for port in pin.ports} == set(fpga.signature.members)
 
 
-def test_address_control_takes_no_further_pin() -> None:
+def test_addressing_option_uses_no_additional_pin() -> None:
     published, addressed = ({port for pin in pins for port in pin.ports} for pins in TABLES)
     assert {port.name for port in addressed - published} == {"DATA_I"}
     assert published < addressed
 
 
 @pytest.mark.filterwarnings("ignore::amaranth.hdl.UnusedElaboratable")
-def test_rejects_impossible_side() -> None:
+def test_cubesense_fpga_rejects_an_unknown_side() -> None:
     with pytest.raises(ValueError, match='must be "sun" or "nadir", not \'moon\''):
         CubeSenseFpga("moon")  # type: ignore[arg-type]
     gc.collect()  # what was refused is never elaborated; have Amaranth say so here

@@ -22,7 +22,9 @@ NEXT_VERSION = ["cubestar-shared", "cubestar-double", "cubestar-boards"]
 
 @pytest.mark.parametrize(("columns", "rows", "seed"), SIZED_SEEDS)
 @pytest.mark.parametrize("name", ["store", "read", "modes"])
-def test_published(icarus: Any, name: str, columns: int, rows: int, seed: int) -> None:
+def test_published_gateware_passes_its_testbenches(
+    icarus: Any, name: str, columns: int, rows: int, seed: int
+) -> None:
     icarus.run(CubeStarTop, columns, rows, *modules(STAR, name), seed=seed)
 
 
@@ -35,18 +37,20 @@ def test_published_needs_no_initial_values(icarus: Any, seed: int) -> None:
 
 
 @pytest.mark.slow
-def test_full_frame(icarus: Any) -> None:
+def test_store_and_read_of_a_full_frame_pass_the_testbench(icarus: Any) -> None:
     harness = Path(__file__).with_name("full_frame.v")
     icarus.run(CubeStarTop, 1024, 512, *modules(STAR, "full_frame"), seed=1, harness=harness)
 
 
-def test_published_borders(icarus: Any) -> None:
+def test_published_gateware_passes_the_border_testbench(icarus: Any) -> None:
     icarus.run(CubeStarTop, 5, 3, *modules(STAR, "borders"), seed=1)
 
 
 @pytest.mark.parametrize(("columns", "rows", "seed"), quick([(5, 3, 2), (8, 4, 1), (32, 16, 3)], 1))
 @pytest.mark.parametrize("top", quick(NEXT_VERSION, 2))
-def test_bus(icarus: Any, top: str, columns: int, rows: int, seed: int) -> None:
+def test_gateware_versions_with_a_bus_pass_their_testbenches(
+    icarus: Any, top: str, columns: int, rows: int, seed: int
+) -> None:
     tier = TIERS[top]
     on_bus = [name for name in tier.modules if not name.endswith("states")]
     icarus.run(tier.design, columns, rows, *on_bus, seed=seed, environment=tier.further)
@@ -66,7 +70,7 @@ def with_board(wrapper: AsPublished, name: str) -> str:
 
 @pytest.mark.parametrize(("columns", "rows", "seed"), quick([(5, 3, 1), (8, 4, 2)], 1))
 @pytest.mark.parametrize("wrapper", quick([SharedAsPublished, DoubleAsPublished], 1))
-def test_next_version_stores_as_the_published_board(
+def test_new_gateware_version_passes_the_published_store_testbenches(
     icarus: Any, wrapper: type[AsPublished], columns: int, rows: int, seed: int
 ) -> None:
     icarus.run(wrapper, columns, rows, *STORING, seed=seed, text=with_board)
@@ -84,7 +88,7 @@ def test_header_has_every_pin_once() -> None:
     assert positions == sorted(set(positions))
 
 
-def test_document_has_the_same_pins() -> None:
+def test_documentation_lists_every_header_pin() -> None:
     text = (Path(__file__).parents[3] / "docs" / "sensors" / "gateware.md").read_text()
     rows = re.findall(r"^\| ([\d-]+) \| `(\w+)` \| (in|out) \| (.+) \|$", text, re.M)
     assert rows == [

@@ -35,7 +35,7 @@ def levels(engine: RtlEngine) -> dict[str, object]:
 
 @pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
 @pytest.mark.parametrize("name", quick_ones(BOARDS, "cubestar"))
-def test_bursts_settle_as_single_edges_do(name: str) -> None:
+def test_skipped_bursts_settle_like_single_edges(name: str) -> None:
     board = BOARDS[name]
     wiring = board.wiring(False)
     rng = np.random.default_rng([*name.encode()])
@@ -72,7 +72,7 @@ def suits(wiring: Wiring, at: dict[str, int], burst: tuple[tuple[str, int], ...]
 
 
 @pytest.mark.parametrize("name", quick(WORKLOADS, 2))
-def test_what_is_measured_runs_in_steps_of_one_clock(name: str) -> None:
+def test_benchmark_workloads_run_in_single_clock_steps(name: str) -> None:
     """The levels have a copy of their own, of which each camera's share of an edge is known."""
     wiring, load = BOARDS[name].wiring(False), WORKLOADS[name]
     rtlil = rtlil_text(wiring.component)

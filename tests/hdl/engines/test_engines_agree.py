@@ -72,7 +72,7 @@ def difference(wiring: Wiring, events: list[PinEvent], found: Played, expected: 
 
 
 @pytest.mark.parametrize("seed", quick(SEEDS, 1))
-def test_settled_pin_by_settled_pin(case, seed):
+def test_engines_agree_with_icarus_on_every_settled_pin(case, seed):
     events = case.events(seed)
     expected = case.icarus.play(events)
     assert expected.outputs.shape == (len(events), len(case.wiring.output_pins))

@@ -47,14 +47,14 @@ def test_same_seed_gives_the_same_mutants(counter: Netlist, every: list[Mutant])
     assert {(m.cell, m.port, m.bit) for m in some} < {(m.cell, m.port, m.bit) for m in every}
 
 
-def test_netlist_is_the_same_everywhere(counter: Netlist) -> None:
+def test_netlist_is_reproducible_and_free_of_local_paths(counter: Netlist) -> None:
     assert netlist(CounterAlone(COLUMNS, ROWS)) == counter
     assert str(Path(__file__).parent.anchor) + "home" not in counter.text
     assert 'src "counters.py:' in counter.text
     assert "\\init" not in counter.text
 
 
-def test_all_mutants_are_in_one_text(counter: Netlist, every: list[Mutant]) -> None:
+def test_one_verilog_text_selects_among_all_mutants(counter: Netlist, every: list[Mutant]) -> None:
     text = selectable(counter, every)
     assert text.count("$value$plusargs") == 1
     assert all(f"chosen_mutant == 16'h{n:04x}" in text for n in range(1, len(every) + 1))
@@ -65,14 +65,18 @@ def test_rejects_too_many_mutants(counter: Netlist, every: list[Mutant]) -> None
         selectable(counter, every[:1] * 65536)
 
 
-def test_finds_differences_and_unreset_state(every: list[Mutant], equivalence: Equivalence) -> None:
+def test_equivalence_check_finds_differences_and_unreset_state(
+    every: list[Mutant], equivalence: Equivalence
+) -> None:
     stuck = next(m for m in every if (m.mode, m.wire, m.port) == ("const0", "address[1]", "Q"))
     unreset = next(m for m in every if (m.mode, m.port) == ("const0", "ARST"))
     assert equivalence.compare(stuck)[:2] == (False, 2 * (COLUMNS - 1) + 1)
     assert equivalence.compare(unreset)[:2] == (False, 1)
 
 
-def test_where_no_state_differs_is_proved(every: list[Mutant], equivalence: Equivalence) -> None:
+def test_equivalence_check_proves_an_equivalent_mutant(
+    every: list[Mutant], equivalence: Equivalence
+) -> None:
     """The last column is 2, so its lower bit need not be looked at: 3 never comes."""
     text = Path(counters.__file__).read_text(encoding="utf-8").splitlines()
     (line,) = (n for n, row in enumerate(text, 1) if "self.last_column.eq(" in row)
@@ -87,7 +91,7 @@ def score(*options: str) -> "subprocess.CompletedProcess[str]":
 
 
 @pytest.mark.slow
-def test_block_is_scored(tmp_path: Path) -> None:
+def test_mutation_score_of_a_block_is_kept_and_reused(tmp_path: Path) -> None:
     """Three wrong gates that the bench notices and one that makes no difference."""
     options = ("matrix-counter", "--count", "4", "--seed", "23", "--out", str(tmp_path), "--json")
     done = score(*options)

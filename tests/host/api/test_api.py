@@ -24,7 +24,7 @@ def test_unknown_name_is_rejected(module: ModuleType) -> None:
         _ = module.Nodeboard
 
 
-def test_lazy_names_are_the_public_ones() -> None:
+def test_lazily_imported_names_equal_the_public_api() -> None:
     assert {*cubestack._HOMES, "__version__"} == set(cubestack.__all__)
 
 
@@ -62,7 +62,7 @@ def test_every_name_loads(name: str) -> None:
     assert name in dir(sensor)
 
 
-def test_names_are_those_of_their_modules() -> None:
+def test_sensor_api_names_equal_those_of_their_modules() -> None:
     assert sensor.u8 is u8
     for names in sensor.TOPICS.values():
         assert all(name == own for name, (_, own) in names.items())

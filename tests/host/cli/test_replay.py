@@ -36,13 +36,13 @@ def check_same(outcome):
     assert "no difference" in outcome.out
 
 
-def test_no_difference(recording, run, tmp_path):
+def test_replay_of_a_recording_has_no_difference(recording, run, tmp_path):
     again = tmp_path / "b.rec"
     check_same(run("replay", recording, "--record", again))
     assert again.read_text() == recording.read_text()
 
 
-def test_changed_default_is_named(recording, run, monkeypatch):
+def test_replay_reports_a_changed_default(recording, run, monkeypatch):
     reset = CameraSettings.at_reset
 
     def changed(camera):
@@ -99,7 +99,7 @@ def test_recording_stores_seed_scenes_faults_and_switches(session, run, tmp_path
         ("aramis", "write Activate; write GetAttitude; time 2; dump; fault memory-flip; dump"),
     ],
 )
-def test_a_session_of_each_device_replays(tmp_path, run, device, commands):
+def test_recorded_session_of_each_device_replays_identically(tmp_path, run, device, commands):
     made = tmp_path / "session.rec"
     assert run("shell", f"emulated:{device}", "--record", made, "-c", commands).code == 0
     check_same(run("replay", made))
@@ -193,7 +193,7 @@ def test_reports_files_that_cannot_be_opened(recording, run):
     assert (outcome.code, "can not write no/folder/x.vcd" in outcome.line) == (2, True)
 
 
-def test_trace_of_a_time_span(recording, run, tmp_path):
+def test_replay_traces_a_time_span(recording, run, tmp_path):
     made = tmp_path / "span.vcd"
     assert run("replay", recording, "--trace", made, "--trace-to", "0.001").code == 0
     times = [int(line[1:]) for line in made.read_text().splitlines() if line.startswith("#")]

@@ -32,7 +32,7 @@ def shell(run):
     return partial(run, "shell")
 
 
-def test_emulated_cubesense(shell):
+def test_shell_commands_run_on_emulated_cubesense(shell):
     commands = (
         "write CaptureAndDetect SUN SRAM1; time 0.5; read Result1 Detect; bench q;"
         "write SUN_THRESHOLD 30; read SUN_THRESHOLD; fault latch-up SRAM2; time 0.1;"
@@ -48,7 +48,7 @@ def test_emulated_cubesense(shell):
     assert results[-1]["values"] == {"OverCurrent2": 1}
 
 
-def test_emulated_cubestar_with_a_script(shell, tmp_path):
+def test_shell_runs_a_script_on_emulated_cubestar(shell, tmp_path):
     script = tmp_path / "commands.txt"
     script.write_text("# comment\n\nread Identification NodeType\nquit\nread nonsense\n")
     assert shell("emulated:cubestar", "--script", str(script)) == (0, "NodeType  5\n", "")
@@ -92,7 +92,7 @@ def test_image_reports_an_over_current_of_its_memory(shell, tmp_path, monkeypatc
     assert "SRAM1 drew too much current" in err
 
 
-def test_interactive(tmp_path):
+def test_shell_runs_interactively_on_a_terminal(tmp_path):
     master, slave = pty.openpty()
     environment = os.environ | {"XDG_STATE_HOME": str(tmp_path), "TERM": "dumb"}
     command = [sys.executable, "-m", "cubestack.host.cli.main", "shell", "emulated:cubesense"]

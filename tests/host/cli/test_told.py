@@ -352,7 +352,7 @@ def test_list_shows_the_shipped_plans(run: Run) -> None:
 
 @pytest.mark.parametrize("as_json", [False, True])
 @pytest.mark.parametrize("worse", [False, True])
-def test_report_prints_what_got_worse(
+def test_campaign_report_prints_what_got_worse(
     run: Run, folder: SimpleNamespace, monkeypatch: pytest.MonkeyPatch, worse: bool, as_json: bool
 ) -> None:
     changes = [

@@ -54,7 +54,7 @@ def test_full_buffer_is_retried_once(interface: Interface, device: type[DeviceCl
 
 
 @DEVICES
-def test_i2c_has_no_stream(interface: Interface, device: type[Any]) -> None:
+def test_client_rejects_streams_over_i2c(interface: Interface, device: type[Any]) -> None:
     client = device(over_i2c(FakeNode(interface)))
     assert client.stars() == []
     with pytest.raises(TypeError, match=r"StreamDownImage: .* over a UART only"):
@@ -68,7 +68,7 @@ def test_rejects_a_quaternion_that_is_no_rotation(wrong: dict[str, float]) -> No
         unit_quaternion(values)
 
 
-def test_picture_is_rejected_where_there_is_none(node: FakeNode) -> None:
+def test_image_request_is_rejected_where_unsupported(node: FakeNode) -> None:
     with pytest.raises(TargetError, match="CubeStar sends no picture"):
         DeviceClient(NodeClient(UartLink(node), CUBESTAR)).picture()
     with pytest.raises(TargetError, match="AraMiS sends its image over a serial line only"):

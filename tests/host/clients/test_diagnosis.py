@@ -55,7 +55,9 @@ def answering(answer: Callable[[bytes], bytes]) -> Iterator[str]:
         (lambda _data: b"login: ", "bytes arrive, but no frame: .* (6c 6f 67 69 6e 3a 20)"),
     ],
 )
-def test_diagnosis_follows_from_the_answer(answer: Callable[[bytes], bytes], told: str) -> None:
+def test_diagnosis_depends_on_the_received_bytes(
+    answer: Callable[[bytes], bytes], told: str
+) -> None:
     with answering(answer) as port:
         line = open_transport(port, INTERFACE.baud)
         found = why_silent(line, INTERFACE)
@@ -64,7 +66,7 @@ def test_diagnosis_follows_from_the_answer(answer: Callable[[bytes], bytes], tol
     assert bool(found) == bool(told)
 
 
-def test_other_lines_are_not_diagnosed(sense: object) -> None:
+def test_diagnosis_is_for_real_serial_lines_only(sense: object) -> None:
     assert why_silent(UartLink(sense), INTERFACE) == ""  # type: ignore[arg-type]
 
 

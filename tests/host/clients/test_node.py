@@ -131,7 +131,9 @@ def test_endless_noise_counts_as_no_answer() -> None:
     assert line.reads == 2 * MAX_READS
 
 
-def test_processing_is_polled(client: NodeClient, node: Any, uart: Any) -> None:
+def test_wait_processed_polls_until_done_or_time_out(
+    client: NodeClient, node: Any, uart: Any
+) -> None:
     node.busy = 5
     client.command("DetectStars")
     client.wait_processed(1.0)
@@ -199,7 +201,7 @@ def test_telecommand_without_acknowledge_is_not_retried(
     assert node.log == []
 
 
-def test_silent_address_is_named(i2c: Any) -> None:
+def test_i2c_client_names_a_silent_address(i2c: Any) -> None:
     client = I2cClient(i2c, INTERFACE, 0x55, wait=i2c.waits.append)
     with pytest.raises(NoAnswerError, match=r"telemetry ErrorFlags .* address 0x55 in 3 attempts"):
         client.telemetry("ErrorFlags")

@@ -28,7 +28,7 @@ def test_measurements_are_signed_big_endian(client: RegisterClient, slave: Slave
     assert client.read("SUN_Y") == 12.34
 
 
-def test_configuration_is_one_byte(client: RegisterClient, slave: Slave) -> None:
+def test_register_write_sends_address_and_one_byte(client: RegisterClient, slave: Slave) -> None:
     address = REGISTERS["NADIR_THRESHOLD"].address
     client.write("NADIR_THRESHOLD", 85)
     client.write("measure", "NADIR_SRAM1")
@@ -36,7 +36,7 @@ def test_configuration_is_one_byte(client: RegisterClient, slave: Slave) -> None
     assert client.read("NADIR_THRESHOLD") == 85
 
 
-def test_picture_is_read_in_chunks_and_restarts_after_a_failure(
+def test_image_is_read_in_chunks_and_restarts_after_a_failure(
     client: RegisterClient, slave: Slave
 ) -> None:
     picture = np.random.default_rng(2).integers(0, 256, 307_200, np.uint8).tobytes()
@@ -84,7 +84,7 @@ def test_reads_are_retried_and_writes_are_not(client: RegisterClient, slave: Sla
     assert slave.written == []
 
 
-def test_silent_address_is_named(slave: Slave) -> None:
+def test_register_client_names_a_silent_address(slave: Slave) -> None:
     client = RegisterClient(slave, REGISTERS, 0x33, wait=slave.waits.append)
     with pytest.raises(NoAnswerError, match=r"register SUN_X .* address 0x33 in 3 attempts"):
         client.read("SUN_X")
@@ -108,7 +108,7 @@ class Answering(Line):
         raise AssertionError("the line stays its owner's")
 
 
-def test_registers_on_a_serial_line() -> None:
+def test_register_client_works_on_a_serial_line() -> None:
     picture = np.random.default_rng(2).integers(0, 256, 307_200, np.uint8).tobytes()
     line = Answering(picture, failures=1)
     client = RegisterClient(RegisterLine(line), REGISTERS, wait=lambda _s: None)

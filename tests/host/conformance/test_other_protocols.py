@@ -87,7 +87,9 @@ def test_correct_device_passes_and_keeps_its_settings(slave: Registers, bench: L
         assert checks[f"bench letter {one.letter!r}"].detail == f"{one.length} bytes"
 
 
-def test_each_setting_is_written_at_both_ends_and_beyond(slave: Registers, bench: Any) -> None:
+def test_conformance_writes_each_register_at_its_limits_and_beyond(
+    slave: Registers, bench: Any
+) -> None:
     checks = checked(slave, bench)
     for one in SETTINGS:
         written = [data[1] for data in slave.written if data[0] == one.address]
@@ -116,7 +118,7 @@ def test_stored_invalid_value_is_found(slave: Registers, bench: LetterLine) -> N
     assert all("is not allowed, but" in detail for detail in found.values())
 
 
-def test_checks_without_a_line_are_skipped() -> None:
+def test_conformance_skips_checks_without_a_bus_or_bench_line() -> None:
     checks = checked(None, None)
     skipped = {name: one.detail for name, one in checks.items() if one.verdict is Verdict.SKIPPED}
     assert set(checks) - set(skipped) == {"unknown telecommand IDs"}

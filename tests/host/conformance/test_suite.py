@@ -122,7 +122,7 @@ def test_nothing_is_sent_without_permission(good, uart):
     assert all("--allow-write" in check.detail for check in skipped)
 
 
-def test_settings_are_put_back(good, uart):
+def test_conformance_suite_restores_settings(good, uart):
     before = {name: dict(values) for name, values in good.values.items()}
     failures(suite(good, uart, allow_write=True))
     after = {name: dict(values) for name, values in good.values.items()}
@@ -144,7 +144,9 @@ def test_settings_are_put_back(good, uart):
         (b"\x10", b"\x03", "telecommand CaptureImage", "refused: BAD_PARAMETER"),
     ],
 )
-def test_fault_is_found(good, uart, monkeypatch, payload, reply, check, detail):
+def test_conformance_suite_finds_each_device_fault(
+    good, uart, monkeypatch, payload, reply, check, detail
+):
     answer = good.answer
     monkeypatch.setattr(good, "answer", lambda p: reply if p == payload else answer(p))
     assert detail in failures(suite(good, uart, allow_write=True))[check]
@@ -234,7 +236,7 @@ def test_firmware_with_one_profile_may_refuse_the_others(good, uart, monkeypatch
         lambda now, wanted, _name: wanted != now and wanted.tracking == now.tracking,
     ],
 )
-def test_firmware_that_refuses_some_switches_is_found(good, uart, monkeypatch, refuses):
+def test_suite_finds_firmware_that_refuses_some_switches(good, uart, monkeypatch, refuses):
     refuse(monkeypatch, good, refuses)
     assert "telecommand SetSwitch" in failures(suite(good, uart, allow_write=True))
 
@@ -246,7 +248,7 @@ def test_firmware_that_refuses_some_switches_is_found(good, uart, monkeypatch, r
         (lambda sent: encode_frame(bytes(127)) + sent, "block 0 has 127 bytes, declared 128"),
     ],
 )
-def test_wrong_picture_stream_is_found(good, uart, monkeypatch, change, detail):
+def test_suite_finds_a_wrong_image_stream(good, uart, monkeypatch, change, detail):
     def change_stream(_values) -> None:
         uart.later[:] = change(uart.later)
 
@@ -271,7 +273,7 @@ def test_answer_to_an_unknown_telemetry_is_found(good, uart, monkeypatch):
     assert failures(suite(good, uart)) == {f"unknown telemetry ID {unknown}": "answered with 01"}
 
 
-def test_deaf_decoder_is_found(good, uart, monkeypatch):
+def test_suite_finds_a_decoder_that_ignores_frames_after_noise(good, uart, monkeypatch):
     write = uart.write
     monkeypatch.setattr(uart, "write", lambda data: write(data) if data[:1] == b"\x1f" else None)
     assert set(failures(suite(good, uart))) == {"framing: noise before a frame"}
@@ -290,7 +292,7 @@ def delay(monkeypatch, node, run, when):
 
 
 @pytest.mark.parametrize(("late", "failed"), [(1, False), (3, True)])
-def test_late_answers_are_found_unless_they_are_single(good, uart, monkeypatch, late, failed):
+def test_suite_reports_repeated_late_answers_only(good, uart, monkeypatch, late, failed):
     run, left = suite(good, uart), [True] * late
     delay(monkeypatch, good, run, lambda payload: payload == b"\x87" and left and left.pop())
     assert ("times of answers" in failures(run, without="")) is failed
@@ -305,7 +307,7 @@ def test_values_to_try_are_valid_and_distinct(interface):
         assert all(tried.count(values) == 1 for values in tried)
 
 
-def test_masks_are_read_back_and_measurements_are_not():
+def test_conformance_reads_masks_back_but_not_measurements():
     names = ("XMin", "XMax", "YMin", "YMax")
     for number in (1, 2):
         places = read_back(CUBESENSE, CUBESENSE.telecommand(f"Mask{number}"), NOTES["cubesense"])

@@ -65,7 +65,7 @@ def test_invalid_registration_is_reported_and_not_listed(
         device("other")
 
 
-def test_merged_tables_skip_one_that_does_not_load() -> None:
+def test_merged_tables_skip_a_device_that_does_not_load() -> None:
     tables = {
         "cubestar": get("nowhere:TOPS"),
         "aramis": lambda: {"a": 1},
@@ -93,7 +93,7 @@ def test_rejects_invalid_options(name: str, options: dict[str, object], message:
         open_device(name, **options)
 
 
-def test_devices_beside_each_other_share_time_and_bus() -> None:
+def test_second_device_on_a_bus_needs_another_address() -> None:
     with open_device("aramis", seed=1) as first, open_device("aramis", seed=1) as alone:
         with pytest.raises(ValueError, match="address"):
             open_device("aramis", beside=first)  # both would be at the same I2C address

@@ -74,7 +74,7 @@ def test_device_without_results_is_an_error(either_client: Client) -> None:
         DeviceClient(either_client).take_picture()
 
 
-def test_log_command(run: Run) -> None:
+def test_log_command_writes_one_line_per_interval(run: Run) -> None:
     code, out, err = run(
         *("log", "emulated:cubesense", "--count", "4", "--interval", "0.5", "--seed", "3"),
         *("-c", "write SUN_THRESHOLD 30", "--each", "write CaptureAndDetect SUN SRAM1; time 0.3"),
@@ -138,7 +138,7 @@ CORNERS = ("XMin", "XMax", "YMin", "YMax")
         ("aramis", "SetGain", ["Gain.Gain"]),
     ],
 )
-def test_each_setting_is_shown_once_per_area(
+def test_shown_settings_list_each_telemetry_field_of_a_telecommand(
     name: str, telecommand: str, places: list[str]
 ) -> None:
     sensor = device(name)

@@ -35,7 +35,7 @@ def device() -> Iterator[Any]:
         yield device
 
 
-def test_serial_port_of_a_device(device: Any) -> None:
+def test_device_serial_port_works_in_virtual_time(device: Any) -> None:
     with device.serial(timeout=0.5) as port:
         assert port.write(ASK) == len(ASK)
         assert port.read_until(b"\x1f\xff", size=3)[:2] == b"\x1f\x7f"

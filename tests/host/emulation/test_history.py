@@ -96,7 +96,7 @@ def test_later_actions_are_not_repeated(make):
     assert devices[0].client.client.telemetry("Configuration")["Threshold1"] == 7
 
 
-def test_going_back_can_stop_earlier(make):
+def test_going_back_can_stop_before_an_event(make):
     devices, past = make("cubesense")
     kernel = devices[0].board.kernel
     kernel.advance_to(5 * PS_PER_S)

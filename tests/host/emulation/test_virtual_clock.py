@@ -73,7 +73,7 @@ def test_poll_loop_of_an_hour_takes_virtual_time(clock: Any, driver: Any) -> Non
     assert time.monotonic() - began_s < 60
 
 
-def test_busy_loop_ends(clock: Any, driver: Any) -> None:
+def test_polling_loop_ends_as_virtual_time_advances(clock: Any, driver: Any) -> None:
     device = FakeDevice()
     with clock.follow(device):
         looks = driver.spin(0.1)
@@ -128,7 +128,7 @@ def test_other_modules_and_threads_keep_wall_time(clock: Any, driver: Any) -> No
         assert REAL["monotonic"]() - began_s >= 0.005
 
 
-def test_leaving_restores_the_clocks(clock: Any, driver: Any) -> None:
+def test_leaving_virtual_time_restores_the_clocks(clock: Any, driver: Any) -> None:
     own = dict(vars(driver))
     with clock.follow(FakeDevice()):
         from time import sleep as kept

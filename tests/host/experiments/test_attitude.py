@@ -36,7 +36,7 @@ def test_attitude_is_right_within_0_1_deg_across_and_0_3_deg_roll(
     assert is_right(cross, roll) is right
 
 
-def test_comparison_without_truth_or_solution_is_none() -> None:
+def test_comparison_without_truth_or_solution_has_no_error() -> None:
     both, lost, blind = compare(TRUTH, TRUTH), compare(None, TRUTH), compare(TRUTH, None)
     assert (both["solved"], both["right"], both["quaternion"]) == (True, True, TRUTH.tolist())
     assert (lost["solved"], lost["right"], lost["quaternion"]) == (False, False, None)
@@ -44,7 +44,7 @@ def test_comparison_without_truth_or_solution_is_none() -> None:
 
 
 @pytest.mark.slow
-def test_hints_are_uniform_in_their_cap() -> None:
+def test_hints_are_uniform_within_their_angle() -> None:
     rng = np.random.default_rng(3)
     boresight = matrix_from_quaternion(TRUTH)[2]
     hints = np.array([rough_boresight(TRUTH, 5.0, rng) for _ in range(2000)])
@@ -74,12 +74,12 @@ def test_axis_errors_are_a_rotation_vector_at_any_angle(degrees: float) -> None:
         assert np.linalg.norm(expected) == pytest.approx(degrees, rel=1e-6, abs=1e-9)
 
 
-def test_axis_errors_of_a_half_turn() -> None:
+def test_axis_errors_of_a_half_turn_add_up_to_180_deg() -> None:
     found = axis_errors_deg(np.array([1.0, 0, 0, 0]), np.array([0, 0, 0, 1.0]))
     assert np.linalg.norm(found) == pytest.approx(180)
 
 
-def test_claims_need_truth_and_quality() -> None:
+def test_sigma_is_compared_with_errors_only_with_truth_and_quality() -> None:
     values = dict.fromkeys(("CorrelationXY", "CorrelationXZ", "CorrelationYZ"), 0.0)
     values |= {f"Sigma{axis}": np.radians(n) for n, axis in enumerate("XYZ", 1)}
     names = ("Matched", "Expected", "Residual", "Background", "Noise", "Spikes")

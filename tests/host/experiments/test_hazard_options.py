@@ -67,7 +67,7 @@ def test_earth_hazard_is_added_for_its_cameras_only(name: str, camera: CameraTar
         assert added == int(concerned)
 
 
-def test_the_moon_is_in_the_field_of_every_frame() -> None:
+def test_moon_is_in_the_field_of_every_frame() -> None:
     axes = matrix_from_quaternion(VIEW.scene.quaternion)
     places = set()
     for seed in range(20):
@@ -79,7 +79,7 @@ def test_the_moon_is_in_the_field_of_every_frame() -> None:
     assert len(places) == 20
 
 
-def test_without_a_hazard_the_view_does_not_change() -> None:
+def test_view_is_unchanged_without_hazards() -> None:
     rng: Any = None  # nothing may be drawn
     assert with_hazards(VIEW, (), rng) is VIEW
     earth = random_view(CubeSenseOptions(), Camera.SUN, np.random.default_rng(1))

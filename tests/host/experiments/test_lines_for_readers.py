@@ -58,7 +58,7 @@ class Given(Telling):
         yield Facts({"name": "sun", "angle_deg": 1.5, "found": None})
 
 
-def test_default_row_has_the_values_in_order() -> None:
+def test_default_result_row_has_the_values_in_order() -> None:
     (result,) = Given().run(None, None)
     assert Given().row(0, result) == ("sun", "1.5", "None")
 
@@ -72,7 +72,7 @@ def test_default_row_has_the_values_in_order() -> None:
         (UNKNOWN, ("7", "-", "12", "9", "-", "-", "-", "calculated")),
     ],
 )
-def test_row_of_an_attitude(result: AttitudeResult, row: tuple[str, ...]) -> None:
+def test_attitude_result_prints_as_a_row(result: AttitudeResult, row: tuple[str, ...]) -> None:
     assert EXPERIMENT.row(7, result) == row
     assert len(row) == len(EXPERIMENT.columns)
 
@@ -101,7 +101,7 @@ def test_percentiles_count_right_frames_only() -> None:
     assert "95th" not in summary(WRONG, REFUSED)
 
 
-def test_claims_are_counted_by_axis() -> None:
+def test_summary_counts_axes_within_the_claimed_sigma() -> None:
     claimed = replace(RIGHT, sigma_deg=[0.1, 0.1, 0.2], error_deg=[0.05, -0.2, 0.7])
     told = summary(claimed, replace(claimed, error_deg=[0.01, -0.02, -0.1]), RIGHT)
     assert "67 % are within the claimed sigma, 83.3 % within three" in told
@@ -109,7 +109,7 @@ def test_claims_are_counted_by_axis() -> None:
 
 
 @pytest.mark.parametrize(("right", "helps"), [(1, True), (2, False), (3, False)])
-def test_advice_is_printed_below_half_right(right: int, helps: bool) -> None:
+def test_advice_is_printed_when_less_than_half_is_right(right: int, helps: bool) -> None:
     told = summary(*[RIGHT] * right, *[REFUSED] * (4 - right), *[UNKNOWN] * 9)
     assert ("what may help: --mode assisted" in told) == helps
 
@@ -125,7 +125,7 @@ def test_report_section_needs_a_known_truth() -> None:
     assert list(EXPERIMENT.sections([vars(UNKNOWN)])) == []
 
 
-def test_arcseconds() -> None:
+def test_degrees_are_printed_as_arcseconds() -> None:
     assert (arcsec(None), arcsec(0.5), arcsec(-0.001)) == ("-", "1800.0", "-3.6")
 
 
@@ -218,7 +218,7 @@ def told_of_sensors(*results: SensorResult) -> list[str]:
     return list(cubesense.EXPERIMENT.summarise(results, 3.25))
 
 
-def test_row_of_a_direction() -> None:
+def test_direction_result_prints_as_a_row() -> None:
     row = cubesense.EXPERIMENT.row(0, SUN)
     numbers = ("10.00", "10.10", "-5.00", "-5.00", "0.100", "-", "150", "50.0")
     assert row == ("sun", *numbers, "detected")
@@ -263,7 +263,7 @@ def test_summary_has_one_line_per_sensor() -> None:
     assert told_of_sensors(replace(SUN, **NOTHING))[0] == "sun: 0 of 1 detected, 0 right"
 
 
-def test_claimed_sigma_is_compared_on_both_axes() -> None:
+def test_sensor_summary_compares_errors_with_sigma_on_both_axes() -> None:
     times = {"a": 3.0, "b": 9.0, "total": 20.0}
     rated = replace(SUN, sigma_deg=(0.2, 0.01), beta_deg=-4.95, phase_ms=times)
     other = replace(rated, sigma_deg=(0.01, 0.2), phase_ms=times | {"a": 11.5, "total": 30.0})
@@ -314,7 +314,7 @@ def test_random_pose_keeps_its_angles_and_is_lit_from_behind() -> None:
     assert (usual.condition.bloom_px, usual.condition.noise) == (7.0, True)
 
 
-def test_row_and_summary_of_the_ball() -> None:
+def test_ball_experiment_prints_row_and_summary() -> None:
     result = ball.BallResult("left", 9, 10, 0.1234, 0.2, 0.05)
     assert ball.EXPERIMENT.row(0, result) == ("left", "0.123", "0.200", "0.050", "9 of 10")
     none = ball.BallResult("up", 0, 10, None, None, None)

@@ -140,7 +140,7 @@ def test_each_frame_has_its_own_scene() -> None:
     ]
 
 
-def test_table_and_summary() -> None:
+def test_scene_experiment_prints_table_and_summary() -> None:
     one = experiment()
     results = list(one.run(opened, MeasureOptions(frames=3)))
     assert one.columns == ("found deg", "error deg", "right")

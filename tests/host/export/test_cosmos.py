@@ -90,7 +90,7 @@ def test_telemetry_values_match_the_client(interface: Interface) -> None:
 
 
 @EACH
-def test_command_values_match_the_node(interface: Interface) -> None:
+def test_exported_commands_encode_the_values_the_node_decodes(interface: Interface) -> None:
     packets = parse(cosmos(interface))
     assert len(packets) == len(interface.messages) + len(messages(interface, MessageKind.TELEMETRY))
     for message in interface.messages:

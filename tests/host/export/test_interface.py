@@ -207,7 +207,7 @@ def test_each_format_describes_each_switch(name: str, run: Run) -> None:
             assert part in text
 
 
-def test_device_without_switches() -> None:
+def test_switch_export_reports_a_device_without_switches() -> None:
     assert render_switches("Glow", Switches, "table") == "Glow has no switches\n"
 
 

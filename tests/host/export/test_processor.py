@@ -73,7 +73,7 @@ def device(tables, tmp_path: Path) -> SVDDevice:
 
 
 @EACH
-def test_svd_is_valid(tables) -> None:
+def test_exported_svd_is_valid_against_its_schema(tables) -> None:
     folder = Path(cmsis_svd.__file__).parent / "schemas"
     schema = etree.XMLSchema(etree.parse(str(folder / "CMSIS-SVD_1_3_9.xsd")))
     document = etree.fromstring(svd(tables).encode())

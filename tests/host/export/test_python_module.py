@@ -75,7 +75,7 @@ def test_rejects_values_that_do_not_fit() -> None:
         exported.payload(b"\0")
 
 
-def test_choices_have_names() -> None:
+def test_exported_python_module_decodes_choices_to_names() -> None:
     exported = module(CUBESTAR)
     message = next(one for one in CUBESTAR.messages if any(f.choices for f in one.fields))
     named = next(one for one in message.fields if one.choices)

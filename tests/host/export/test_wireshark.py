@@ -147,7 +147,7 @@ def test_message_values_match_the_client(interface: Interface) -> None:
                     assert text == pytest.approx(values[field.name], rel=1e-6)
 
 
-def test_acknowledge_and_wrong_length() -> None:
+def test_dissector_names_acknowledge_codes_and_wrong_lengths() -> None:
     interface = INTERFACES[0]
     dissector, prefix = Dissector(interface), interface.name.lower()
     ack = dissector.fields(encode_frame(b"\3"), to_device=False)[f"{prefix}.ack"]
@@ -158,7 +158,7 @@ def test_acknowledge_and_wrong_length() -> None:
     assert items[f"{prefix}.wrong"].text == f"{first.length + 1} bytes, not {first.length}"
 
 
-def test_second_pass_keeps_the_request_of_an_answer() -> None:
+def test_dissector_second_pass_keeps_the_request_of_an_answer() -> None:
     interface = INTERFACES[0]
     dissector, prefix = Dissector(interface), interface.name.lower()
     first, second = messages(interface, MessageKind.TELEMETRY)[:2]

@@ -19,7 +19,7 @@ from tests.emulator.recording import vcd
 from .conftest import SOON_S, TOKEN, Controlled, listening
 
 
-def test_root_lists_all_calls(controlled: Controlled) -> None:
+def test_control_api_root_lists_all_calls(controlled: Controlled) -> None:
     status, told = controlled.ask("GET", "/")
     assert status == 200
     assert [call["path"] for call in told["calls"]] == [call.path for call in CALLS]
@@ -209,7 +209,7 @@ def test_remote_controls_act_on_the_device(
         remote.peek("CMU")
 
 
-def test_advance_keeps_time_running(controlled: Controlled, remote: RemoteControls) -> None:
+def test_remote_advance_does_not_hold_time(controlled: Controlled, remote: RemoteControls) -> None:
     remote.advance(100.0)
     assert not controlled.state()["held"]
 
@@ -242,7 +242,7 @@ def changes(text: str) -> vcd.Changes:
     return vcd.read(BytesIO(text.encode()))
 
 
-def test_trace_of_a_past_time_span(controlled: Controlled) -> None:
+def test_control_api_traces_a_past_time_span(controlled: Controlled) -> None:
     controlled.run(1.0)
     controlled.act("fault", "processor-reset")
     controlled.run(3.0)

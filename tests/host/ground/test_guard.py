@@ -85,7 +85,7 @@ def test_rejects_a_huge_body(controlled: Controlled) -> None:
     assert controlled.ask("GET", "/state")[0] == 200
 
 
-def test_survives_noise(controlled: Controlled) -> None:
+def test_server_survives_malformed_requests(controlled: Controlled) -> None:
     for noise in (b"\0" * 100_000, b"GET / HTTP/9\r\n\r\n", b"GET /" + b"a" * 1_000_000):
         with socket.create_connection(controlled.serving.address, SOON_S) as raw:
             try:
@@ -164,5 +164,5 @@ def test_port_in_use_is_reported(controlled: Controlled) -> None:
     ("name", "own"),
     [("localhost", True), ("127.8.9.1", True), ("::1", True), ("", False), ("a", False)],
 )
-def test_loopback_names(name: str, own: bool) -> None:
+def test_loopback_addresses_are_recognised(name: str, own: bool) -> None:
     assert loopback_name(name) == own

@@ -46,7 +46,7 @@ def test_page_and_its_files_are_served(served: Serving) -> None:
 @pytest.mark.parametrize(
     "path", ["/page/../session.py", "/page/%2e%2e/session.py", "/page/none", "/x"]
 )
-def test_other_paths_are_not_found(served: Serving, path: str) -> None:
+def test_server_returns_404_for_other_paths(served: Serving, path: str) -> None:
     assert ask(served, "GET", path)[0] == 404
 
 
@@ -59,7 +59,7 @@ def test_targets_lists_messages_and_missing_features(served: Serving) -> None:
     assert about["missing"]["bench"] == "no line with the bench protocol is open"
 
 
-def test_shell_commands_are_executed(served: Serving) -> None:
+def test_page_executes_shell_commands(served: Serving) -> None:
     status, told = do(served, "read Identification")
     assert status == 200
     assert ["NodeType", str(told["data"]["values"]["NodeType"])] in told["rows"]
@@ -68,7 +68,7 @@ def test_shell_commands_are_executed(served: Serving) -> None:
     assert (values["DetectionThreshold"], values["StarThreshold"]) == (30, 31)
 
 
-def test_found_lists_the_stars_of_the_device(served: Serving) -> None:
+def test_detections_list_the_stars_of_the_device(served: Serving) -> None:
     assert do(served, "write CaptureAndProcess")[0] == 200
     status, told = ask(served, "GET", "/targets/0/detections/SRAM")
     stars = json.loads(told)["marks"]

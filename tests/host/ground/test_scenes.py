@@ -22,7 +22,7 @@ def show(controlled: Controlled, table: dict[str, Any]) -> tuple[int, Any]:
     return controlled.ask("POST", "/devices/cubestar/act", body)
 
 
-def test_scene_keys(controlled: Controlled) -> None:
+def test_scene_keys_call_describes_the_scene_kinds(controlled: Controlled) -> None:
     status, told = controlled.ask("GET", f"{SCENE}/keys")
     assert status == 200
     assert list(told["kinds"]) == ["sky", "picture"]

@@ -42,7 +42,7 @@ def behind() -> Iterator[Behind]:
     one.session.close()
 
 
-def test_refusal_does_not_break_the_link(behind: Behind) -> None:
+def test_refused_telecommand_does_not_break_the_link(behind: Behind) -> None:
     behind.node.refusals.append(AckError.BAD_PARAMETER)
     with pytest.raises(CommandRefusedError, match="CaptureAndProcess refused: BAD_PARAMETER"):
         behind.session.execute("write CaptureAndProcess").result()
@@ -131,7 +131,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return recorded_threshold(tmp_path_factory.mktemp("played") / "a.rec", 2.0)
 
 
-def test_telemetry_is_that_of_the_played_time(made: Path) -> None:
+def test_playback_returns_telemetry_of_the_played_time(made: Path) -> None:
     clock = [100.0]
     client = PlaybackClient(load_recording(made), CUBESENSE, lambda: clock[0])
     with pytest.raises(NoAnswerError, match=r"before 0\.000 s"):
@@ -153,7 +153,7 @@ def test_telemetry_is_that_of_the_played_time(made: Path) -> None:
             client.play(nonsense, runs=True)
 
 
-def test_recording_is_a_target_of_the_page(made: Path) -> None:
+def test_recording_opens_as_a_page_target(made: Path) -> None:
     assert is_recording(str(made))
     assert not is_recording("/dev/ttyUSB0")
     session = TargetSession(open_recording(str(made)))

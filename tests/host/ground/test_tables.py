@@ -99,7 +99,7 @@ def test_lines_have_every_column(log: ResultLog) -> None:
     assert table["utc"] == [first["utc"], second["utc"]]
 
 
-def test_direction_has_one_error_angle(log: ResultLog) -> None:
+def test_result_log_has_one_error_angle_per_direction(log: ResultLog) -> None:
     truth = {"sun_alpha_deg": 3.0, "sun_beta_deg": 4.0}
     log.add({"sun_alpha_deg": 0.0, "sun_beta_deg": 0.0}, truth)
     log.add({"sun_alpha_deg": -3.0, "sun_beta_deg": -4.0}, truth)
@@ -110,7 +110,7 @@ def test_direction_has_one_error_angle(log: ResultLog) -> None:
     assert [one["sun_beta_error_deg"] for one in lines(log)] == ["-4.0", "-8.0", ""]
 
 
-def test_failures_add_no_lines(log: ResultLog) -> None:
+def test_failed_readings_add_no_lines_to_the_result_log(log: ResultLog) -> None:
     log.add({"error": "no answer"}, {})
     log.add({}, {})
     assert (log.count, lines(log)) == (0, [])

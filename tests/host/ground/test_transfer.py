@@ -78,7 +78,7 @@ def test_cancelled_transfer_ends_after_a_block(held: bool) -> None:
     assert sender.count < 3
 
 
-def test_rejects_data_that_is_no_picture() -> None:
+def test_upload_rejects_data_that_is_no_image() -> None:
     with pytest.raises(ValueError, match="not an image file"):
         grey_values(b"GIF89a and no more")
     assert np.array_equal(grey_values(png(np.eye(3, dtype=np.uint8))), np.eye(3))

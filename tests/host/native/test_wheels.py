@@ -49,7 +49,7 @@ def test_wheel_contains_the_libraries_and_records_them(wheel: Path) -> None:
     assert line == f"{folder}/a-1.so,sha256=p5N7ZLjKpY8Dchu2us9ceMsjX-vg5wsbhM2ZVBRhoI4,5"
 
 
-def test_pip_verifies_and_installs_it_where_the_modules_find_the_libraries(
+def test_pip_installs_the_packed_wheel_with_its_libraries(
     pure: tuple[Path, Path], tmp_path: Path
 ) -> None:
     tag = f"linux_{wheels.os.uname().machine}"  # of this machine, whatever it is

@@ -153,7 +153,7 @@ def test_sky_map_counts_results_per_cell(figures: list[Any]) -> None:
     assert text.get_color() == "black"
 
 
-def test_effects_of_each_part_add_up_to_its_bar(figures: list[Any]) -> None:
+def test_stacked_effects_add_up_to_each_bar(figures: list[Any]) -> None:
     counts = {f"effect {n}": [n + 1, 0 if n else 19] for n in range(8)} | {"never": [0, 0]}
     parts = [("writer", 36), ("bank", 19)]
     effects(parts, counts, [(0.1, 0.3), (0.0, 0.2)], "upsets")

@@ -71,7 +71,7 @@ def test_true_stars_are_placed_by_their_directions() -> None:
 
 
 @pytest.mark.parametrize(("profile", "limbs"), [("published", 0), ("extended", 1)])
-def test_overlay_has_nadir_edges_and_limb(profile: str, limbs: int) -> None:
+def test_overlay_shows_nadir_edges_and_limb(profile: str, limbs: int) -> None:
     with open_device("cubesense", profile=profile) as emulated:
         emulated.client.client.command("CaptureAndDetect", Camera="NADIR", Sram="SRAM2")
         emulated.client.client.wait_processed(10)

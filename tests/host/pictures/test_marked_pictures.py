@@ -41,7 +41,7 @@ BLACK = np.zeros(SHAPE, np.uint8)
 SENSE = np.full((480, 640), 34, np.uint8)
 
 
-def test_save_picture_keeps_grey_values(tmp_path: Path) -> None:
+def test_saved_image_keeps_grey_values(tmp_path: Path) -> None:
     picture = np.random.default_rng(2).integers(0, 256, (30, 50)).astype(np.uint8)
     save_picture(picture, tmp_path / "picture.png")
     assert np.array_equal(opened(tmp_path / "picture.png"), picture)
@@ -50,7 +50,7 @@ def test_save_picture_keeps_grey_values(tmp_path: Path) -> None:
         assert np.array_equal(np.asarray(image), picture)
 
 
-def test_annotate_writes_the_sheet(tmp_path: Path) -> None:
+def test_annotate_writes_the_star_sheet_to_a_file(tmp_path: Path) -> None:
     arguments = (BLACK, [Found(100, 80, 32349)])
     annotate(*arguments, tmp_path / "sheet.png", "sky", ["a"], None, [TrueStar(1, 9, 9)])
     other = star_sheet(*arguments, "sky", ["a"], None, [TrueStar(1, 9, 9)])
@@ -116,7 +116,7 @@ def test_widest_angle_is_at_most_89_5_deg() -> None:
     assert widest_deg(lambda vectors: 50 + 0 * vectors[:, :2], (100, 100)) == 89.5
 
 
-def test_star_has_its_name_or_its_number() -> None:
+def test_star_is_labelled_by_name_or_hipparcos_number() -> None:
     assert [star_name(number) for number in (24436, 91262, 7)] == ["Rigel", "Vega", "HIP 7"]
 
 
@@ -137,7 +137,7 @@ def test_stretch_uses_the_full_range() -> None:
 
 
 @pytest.mark.parametrize(("above", "brightness"), [(6, 0.25), (12, 0.5), (23, 23 / 24)])
-def test_stretch_of_a_faint_picture_is_limited(above: int, brightness: float) -> None:
+def test_stretch_of_a_faint_image_is_limited(above: int, brightness: float) -> None:
     picture = np.full((50, 50), 10, np.uint8)
     picture[:20] = 10 + above
     assert stretched(picture, gamma=1.0).max() == pytest.approx(255 * brightness, abs=1)
@@ -169,7 +169,7 @@ def test_residual_arrow_starts_at_its_place_and_is_magnified(
         assert (x.mean() - 5, y.mean() - 5) == pytest.approx((0, 0), abs=1.5)
 
 
-def test_residuals_are_framed(tmp_path: Path) -> None:
+def test_residual_plot_has_a_frame(tmp_path: Path) -> None:
     save_residuals(np.array([[0.0, 0], [99.2, 49.5]]), np.zeros((2, 2)), tmp_path / "r.png")
     image = opened(tmp_path / "r.png")
     frame = drawn(image, (190, 190, 190), image.shape[0])

@@ -30,13 +30,13 @@ def edges(places: NDArray[np.float64]) -> list[float]:
 @pytest.mark.parametrize(
     ("columns", "scale", "em"), [(200, 1, 11), (620, 2, 20), (1240, 1, 20), (682, 1, 11)]
 )
-def test_text_size_follows_the_picture_within_limits(columns: int, scale: int, em: int) -> None:
+def test_text_size_follows_the_image_size_within_limits(columns: int, scale: int, em: int) -> None:
     sheet = Sheet(np.zeros((60, columns), np.uint8), scale)
     assert sheet.em == em
     assert sheet.image.size == (scale * columns, scale * 60)
 
 
-def test_scaled_picture_repeats_each_pixel() -> None:
+def test_scaled_image_repeats_each_pixel() -> None:
     picture = np.arange(12, dtype=np.uint8).reshape(3, 4) * 20
     image = np.asarray(Sheet(picture, 5).image)
     assert np.array_equal(image[..., 1], np.kron(picture, np.ones((5, 5), np.uint8)))
@@ -95,7 +95,7 @@ def test_mark_blocks_labels_over_its_ink_only(shape: Shape) -> None:
         *(((9, -0.6), False), ((799.6, 9), False), ((9, 399.6), False)),
     ],
 )
-def test_marks_outside_the_picture_are_omitted(place: tuple[float, float], seen: bool) -> None:
+def test_marks_outside_the_image_are_omitted(place: tuple[float, float], seen: bool) -> None:
     sheet = black()
     sheet.mark("circle", np.array(place), RED, 1.0, "name")
     assert bool(len(drawn(sheet.image, RED))) == bool(sheet.blocked) == seen
@@ -235,7 +235,7 @@ def test_names_do_not_cover_marks(written: list[Text]) -> None:
 LONG = " ".join(f"word{number}" for number in range(60))
 
 
-def test_caption_and_legend_fit_below_the_picture(written: list[Text]) -> None:
+def test_caption_and_legend_fit_below_the_image(written: list[Text]) -> None:
     sheet = black()
     sheet.grid(LENS.directions, CORNER_DEG)
     legend = [Entry("circle", RED, f"entry {number} of the legend") for number in range(9)]

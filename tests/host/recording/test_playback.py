@@ -57,7 +57,7 @@ def test_different_parameter_and_end_of_recording_are_named():
         node.telemetry("Identification")
 
 
-def test_recorded_silence_is_silence():
+def test_recorded_missing_answer_raises_no_answer_error():
     with pytest.raises(NoAnswerError):
         client(line((b"\x80", b""), (b"\x80", IDENTIFICATION))).telemetry("Identification")
 
@@ -90,7 +90,7 @@ def test_i2c_client_runs_on_a_recording():
         ([i2c_msg.write(0x1C, [0x80]), i2c_msg.read(0x1B, 8)], "write at 0x1c, recorded a write"),
     ],
 )
-def test_different_transfer_is_named(messages, text):
+def test_replay_reports_a_different_transfer(messages, text):
     with pytest.raises(RecordingMismatchError, match=text):
         bus((b"\x80", IDENTIFICATION, 0)).i2c_rdwr(*messages)
 
@@ -125,7 +125,7 @@ def test_serial_session(node, uart, tape, tmp_path):
     assert session(NodeClient(RecordedTransport(recording, CUBESTAR), CUBESTAR)) == before
 
 
-def test_lost_answers_are_lost_again(node, uart, tape, tmp_path):
+def test_replay_repeats_lost_answers(node, uart, tape, tmp_path):
     node.lost = 2
     line = tape.line(uart, "uart", 57_600)
     before = NodeClient(line, CUBESTAR).telemetry("Identification")
@@ -136,7 +136,7 @@ def test_lost_answers_are_lost_again(node, uart, tape, tmp_path):
         replayed.telemetry("Identification")
 
 
-def test_i2c_session(node, i2c, tape, tmp_path):
+def test_recorded_i2c_session_replays_with_its_errors(node, i2c, tape, tmp_path):
     node.values["TaskStatus"]["taskStatus"] = 1
     i2c.failures = 1
     bus = tape.bus(i2c)
@@ -149,7 +149,7 @@ def test_i2c_session(node, i2c, tape, tmp_path):
     assert session(I2cClient(recorded, CUBESTAR, wait=lambda _s: None)) == before
 
 
-def test_times_run_forward(node, uart, tape, tmp_path):
+def test_host_recording_times_never_overlap(node, uart, tape, tmp_path):
     client = NodeClient(tape.line(uart, "uart", 57_600), CUBESTAR)
     for _ in range(5):
         client.telemetry("ImageBlock")

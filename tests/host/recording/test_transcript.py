@@ -78,7 +78,7 @@ def test_telecommand_has_parameters_and_acknowledge() -> None:
         ([("host", b"")], "not in the tables"),
     ],
 )
-def test_errors_are_named(frames: list[tuple[str, bytes]], error: str) -> None:
+def test_transcript_reports_protocol_errors(frames: list[tuple[str, bytes]], error: str) -> None:
     (one,) = on_the_line(*frames)
     assert one.error.startswith(error)
 

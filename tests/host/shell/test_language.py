@@ -27,7 +27,7 @@ def shell(node, uart) -> Shell:
     return Shell(Target("fake", CUBESTAR, client, uart, device=device("cubestar")))
 
 
-def test_every_telemetry_is_read(shell):
+def test_shell_reads_every_telemetry(shell):
     for message in CUBESTAR.telemetries:
         if message.supported:
             result = shell.execute(f"read {message.name}")
@@ -43,12 +43,12 @@ def test_values_have_units(sense, sense_shell):
 @pytest.mark.parametrize(
     "line", ["write setDetectionThresholds 0x10 StarThreshold=9", "write 21 0x10 9"]
 )
-def test_telecommand_by_name_and_by_number(node, shell, line):
+def test_shell_writes_a_telecommand_by_name_or_number(node, shell, line):
     shell.execute(line)
     assert node.log == [("setDetectionThresholds", {"DetectionThreshold": 16, "StarThreshold": 9})]
 
 
-def test_messages_by_number(shell, sense_shell):
+def test_shell_accepts_message_numbers(shell, sense_shell):
     assert shell.execute("read 128").data == shell.execute("read Identification").data
     assert shell.execute("read 0x80 NodeType").rows == [("NodeType", "0")]
     assert shell.execute("watch 128 2 0").data["name"] == "Identification"
@@ -71,7 +71,7 @@ def test_list_shows_the_number_of_every_name(silent_shell):
         assert silent_shell.execute(f"list {number}").data["name"] == name
 
 
-def test_choices_by_name(sense, sense_shell):
+def test_shell_accepts_choices_by_name(sense, sense_shell):
     sense_shell.execute("write CaptureAndDetect nadir SRAM2")
     assert sense.log == [("CaptureAndDetect", {"Camera": 1, "Sram": 1})]
 
@@ -91,14 +91,14 @@ def test_dump_skips_telemetry_with_side_effects(sense, sense_shell):
     assert "Result1ThenSram1" not in frames
 
 
-def test_watch_reads_again(sense, sense_shell):
+def test_watch_command_repeats_the_reading(sense, sense_shell):
     rows = []
     sense_shell.on_row = rows.append
     result = sense_shell.execute("watch Identification 3 0.1")
     assert len(rows) == len(result.data["readings"]) == 3
 
 
-def test_image(node, shell, tmp_path):
+def test_shell_image_command_saves_the_memory(node, shell, tmp_path):
     node.memory[:] = np.arange(node.memory.size) % 251
     shell.execute(f"image {tmp_path}/a.png")
     assert (np.asarray(Image.open(tmp_path / "a.png")).ravel() == node.memory).all()
@@ -106,7 +106,7 @@ def test_image(node, shell, tmp_path):
         shell.execute(f"image {tmp_path}/a.png x")
 
 
-def test_image_of_a_memory(sense, sense_shell, tmp_path):
+def test_shell_image_command_saves_a_named_memory(sense, sense_shell, tmp_path):
     sense_shell.target.device = device("cubesense")
     sense.pictures[1, 7, 9] = 77
     with pytest.raises(TargetError, match="no memory 'sram3'; known: sram1, sram2"):
@@ -171,7 +171,7 @@ def test_random_lines_run_or_are_rejected(line):
     shell.complete(line)
 
 
-def test_values_are_parsed():
+def test_shell_parses_parameter_values():
     field = CUBESTAR.telecommand("setDelayTimerTimeout").fields[0]
     for text, value in (("12", 12), ("0x1f", 31), ("0b11", 3), ("1.5", 1.5), ("on", 1)):
         assert parse_value(field, text) == value
@@ -179,7 +179,7 @@ def test_values_are_parsed():
     assert parse_values(upload, ["1", "00ff"]) == {"BlockNumber": 1, "Data": b"\0\xff"}
 
 
-def test_every_name_completes(silent_shell):
+def test_shell_completes_every_message_and_field_name(silent_shell):
     shell, interface = silent_shell, silent_shell.target.interface
     for message in interface.telemetries:
         if message.supported:
@@ -211,5 +211,5 @@ def test_every_name_completes(silent_shell):
         ("dump ", []),
     ],
 )  # fmt: skip
-def test_completion(sense_shell, line, found):
+def test_shell_completes_commands_targets_and_parameters(sense_shell, line, found):
     assert sense_shell.complete(line) == found

@@ -26,7 +26,7 @@ def test_wrong_number_of_words_prints_the_usage(known: Known, line: str) -> None
 
 
 @pytest.mark.parametrize("line", ["power SRAM1", "power SRAM1 on off", "power SRAM1 maybe"])
-def test_power_rejects_other_words(known: Known, line: str) -> None:
+def test_power_command_rejects_other_words(known: Known, line: str) -> None:
     with pytest.raises(ShellError, match=r"usage: power \[CHANNEL on\|off\]"):
         known.run(line)
     known.controls.switch.assert_not_called()
@@ -51,7 +51,7 @@ def test_time_advances_and_is_shown(known: Known) -> None:
         known.run("time -1")
 
 
-def test_scene_and_faults(known: Known) -> None:
+def test_shell_scene_and_fault_commands_reach_the_controls(known: Known) -> None:
     assert known.run("scene a.toml").data == {"scene": "a.toml"}
     known.controls.scene.assert_called_once_with(Path("a.toml"))
     listed = known.run("fault")
@@ -65,7 +65,7 @@ def test_scene_and_faults(known: Known) -> None:
     assert done.data == {"fault": "latch-up SRAM1 for_s=2"}
 
 
-def test_peek(known: Known) -> None:
+def test_peek_prints_the_values_of_a_register(known: Known) -> None:
     found = known.run("peek TIMER0")
     known.controls.peek.assert_called_once_with("TIMER0")
     assert found.rows == [("TIMER0.CNT", "0x7"), ("x", "not there")]
@@ -118,7 +118,7 @@ def test_watch_repeats_with_its_interval(known: Known, words: str, pauses: list[
 
 
 @pytest.mark.parametrize(("count", "good"), [(0, False), (1, True), (2, True), (3, False)])
-def test_check_count_has_lower_and_upper_limits(count: int, good: bool) -> None:
+def test_shell_rejects_too_few_or_too_many_words(count: int, good: bool) -> None:
     if good:
         check_count("do A [B]", ["x"] * count, 1, 2)
         return
@@ -133,7 +133,7 @@ def test_check_count_has_lower_and_upper_limits(count: int, good: bool) -> None:
         *((text, False) for text in ("1.99", "1.1e9", "x", "nan")),
     ],
 )
-def test_to_number_has_lower_and_upper_limits(text: str, good: bool) -> None:
+def test_to_number_accepts_2_to_1e9(text: str, good: bool) -> None:
     if good:
         assert to_number("do", text, 2) == float(text)
         return

@@ -11,7 +11,7 @@ from tests.conftest import Run
 
 
 @pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
-def test_uploaded_picture_gives_its_attitude(run: Run, tmp_path: Path) -> None:
+def test_uploaded_rendered_image_yields_its_attitude(run: Run, tmp_path: Path) -> None:
     path, scene = tmp_path / "orion.png", tmp_path / "dark.toml"
     scene.write_text('kind = "sky"\nra_deg = 1\ndec_deg = 2\nmag_limit = 3.8\n')
     pose = ("--ra", "83.8", "--dec", "-5.4", "--roll", "30")
@@ -30,7 +30,7 @@ def test_uploaded_picture_gives_its_attitude(run: Run, tmp_path: Path) -> None:
     assert abs(roll) < 0.02
 
 
-def test_picture_of_aramis(run: Run, tmp_path: Path) -> None:
+def test_picture_command_renders_an_aramis_sky(run: Run, tmp_path: Path) -> None:
     path = tmp_path / "sky.png"
     code, out, err = run("picture", "aramis", "--ra", "10", "--dec", "20", "--out", str(path))
     with Image.open(path) as picture:
@@ -66,7 +66,9 @@ def test_stretched_brightens_faint_stars(run: Run, tmp_path: Path) -> None:
         (("cubestar", "--ra", "1", "--dec", "2", "--out", "x.jpg"), "--out must end in .png"),
     ],
 )
-def test_rejects_wrong_arguments(run: Run, arguments: tuple[str, ...], error: str) -> None:
+def test_picture_command_rejects_wrong_arguments(
+    run: Run, arguments: tuple[str, ...], error: str
+) -> None:
     code, out, err = run("picture", "--out", "x.png", *arguments)
     assert (code, out) == (2, "")
     assert error in err

@@ -53,11 +53,11 @@ def scheduler() -> Iterator[str]:
 
 
 @pytest.mark.parametrize("workers", [1, 2, 3])
-def test_every_job_is_done_once(workers: int) -> None:
+def test_workers_perform_every_job_once(workers: int) -> None:
     assert sorted(performed(square, range(20), workers)) == [(n, n * n) for n in range(20)]
 
 
-def test_one_worker_is_this_process() -> None:
+def test_single_worker_runs_in_this_process() -> None:
     assert {pid for _, pid in performed(own_process, range(3), 1)} == {os.getpid()}
 
 

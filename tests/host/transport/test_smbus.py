@@ -72,7 +72,7 @@ def test_every_smbus2_method_is_overridden() -> None:
     assert CubeSMBus.pec is not SMBus.pec
 
 
-def test_transactions(bus: Any, echo: Echo) -> None:
+def test_smbus_transactions_return_device_data(bus: Any, echo: Echo) -> None:
     assert bus.read_byte_data(ADDRESS, 0x42) == 0x42
     assert bus.read_byte(ADDRESS) == 0x42
     assert bus.read_word_data(ADDRESS, 0x42) == 0x4242
@@ -91,7 +91,7 @@ def test_transactions(bus: Any, echo: Echo) -> None:
     assert [data.hex() for data in echo.log] == written
 
 
-def test_combined_transfers(bus: Any) -> None:
+def test_i2c_rdwr_supports_combined_and_block_reads(bus: Any) -> None:
     write, read = i2c_msg.write(ADDRESS, [1, 2, 3]), i2c_msg.read(ADDRESS, 5)
     bus.i2c_rdwr(write, read)
     assert list(read) == [1, 2, 3, 1, 2]
@@ -122,7 +122,7 @@ def test_rejects_blocks_longer_than_32_bytes(bus: Any) -> None:
         bus.read_i2c_block_data(ADDRESS, 0, 33)
 
 
-def test_packet_error_codes(bus: Any, echo: Echo) -> None:
+def test_smbus_checks_packet_error_codes(bus: Any, echo: Echo) -> None:
     bus.pec = 1
     assert bus.pec == 1
     bus.write_byte(ADDRESS, 5)

@@ -20,7 +20,7 @@ EXTENDED = ("--profile", "extended")
     ],
     ids=["among false stars", "the likely lens"],
 )
-def test_lost_in_space(measure: Measure, options: tuple[object, ...]) -> None:
+def test_aramis_solves_lost_in_space_frames(measure: Measure, options: tuple[object, ...]) -> None:
     for frame in measure(*options, *EXTENDED):
         assert (frame["right"], frame["reason"], frame["wrong"]) == (True, "confirmed", 0)
         assert frame["error_cross_deg"] < GOAL_DEG
@@ -72,7 +72,7 @@ cy = 505.0
 
 
 @pytest.mark.slow
-def test_finds_the_lens_of_an_emulated_unit(
+def test_calibrate_finds_the_lens_of_an_emulated_aramis(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     scene = tmp_path / "unit.toml"

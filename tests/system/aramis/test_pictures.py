@@ -39,7 +39,7 @@ def drawn_anew(path: Path, folder: Path) -> Path:
     return folder / path.name
 
 
-def test_every_picture_is_solved(measure: Measure, tmp_path: Path) -> None:
+def test_every_sample_image_is_solved(measure: Measure, tmp_path: Path) -> None:
     truths = json.loads((FOLDER / "truth.json").read_text())["images"]
     for path in PICTURES:
         picture = drawn_anew(path, tmp_path)

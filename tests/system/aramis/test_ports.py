@@ -53,7 +53,7 @@ def test_attitude_over_plain_pyserial(served: Path) -> None:
     assert abs(roll) < 0.05
 
 
-def test_attitude_over_i2c(session: Open) -> None:
+def test_attitude_is_measured_over_i2c(session: Open) -> None:
     with session(SkyScene(TRUTH)) as opened:
         bus = opened.board.i2c()
         bus.wait(0.1)
@@ -65,7 +65,7 @@ def test_attitude_over_i2c(session: Open) -> None:
 
 
 @pytest.mark.slow
-def test_demonstration(tmp_path: Path) -> None:
+def test_aramis_demo_writes_its_images(tmp_path: Path) -> None:
     assert main(["demo", "aramis", "--out", str(tmp_path)]) == 0
     for name in ("aramis-raw.png", "aramis-stars.png"):
         with Image.open(tmp_path / name) as picture:

@@ -29,7 +29,9 @@ def test_calibration_reduces_the_error(capsys: pytest.CaptureFixture[str]) -> No
 
 
 @pytest.mark.slow
-def test_finds_the_lens_of_a_scene(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_calibrate_finds_the_lens_of_a_scene(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
     scene, out = tmp_path / "unit.toml", tmp_path / "unit.json"
     scene.write_text('kind = "earth-sun"\n' + LENS.format("sun"), encoding="utf-8")
     which = ("--sensor", "sun", "--scene", scene, "--emulated", 24, "--check-poses", 6)
@@ -39,7 +41,7 @@ def test_finds_the_lens_of_a_scene(capsys: pytest.CaptureFixture[str], tmp_path:
     assert json.loads(out.read_text(encoding="utf-8"))["sun"].items() <= found.items()
 
 
-def test_finds_the_lens_from_pictures_of_lights(
+def test_calibrate_finds_the_lens_from_images_of_lights(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     lens = lens_of(CameraTarget.NADIR, LensError((0.8, -0.5), ((40.0, 0.2), (75.0, 0.6))))

@@ -31,7 +31,7 @@ def loop(opened: AnyEmulated, turns: int = TURNS) -> list[dict[Camera, Measureme
     return found[1:]
 
 
-def test_every_turn_measures_the_current_second(session: Open) -> None:
+def test_every_iteration_measures_the_current_second(session: Open) -> None:
     with session(TURNING) as opened:
         turns = loop(opened)
     for number, turn in enumerate(turns):

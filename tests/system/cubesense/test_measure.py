@@ -62,7 +62,7 @@ def test_sun_sensor_meets_its_goal(sun: Frames) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("bloom", [5, 6, 7])
-def test_sun_sensor_with_other_blooms(measure: Measure, bloom: float) -> None:
+def test_sun_sensor_meets_its_goal_with_other_bloom_sizes(measure: Measure, bloom: float) -> None:
     angles = ("--bloom", bloom, "--sun-angle", 45)
     frames = measure(*SUN, *angles, "--frames", 12, "--seed", 5, *EXTENDED)
     assert np.percentile([frame["error_deg"] for frame in frames], 95) < 0.2
@@ -105,7 +105,7 @@ def test_same_seed_gives_the_same_results(measure: Measure) -> None:
     assert first == second
 
 
-def test_other_memory_gives_the_same_directions(measure: Measure) -> None:
+def test_other_memory_returns_the_same_directions(measure: Measure) -> None:
     own, other = (measure("--memory", memory, "--seed", 4) for memory in ("own", "other"))
     for one, another in zip(own, other, strict=True):
         assert another["capture"] == "stored_other_sram"
@@ -124,7 +124,7 @@ def test_sample_search_reads_fewer_pixels(measure: Measure) -> None:
         assert half["error_deg"] < 0.2
 
 
-def test_scene_file(measure: Measure, tmp_path: Path) -> None:
+def test_measure_uses_the_scene_file(measure: Measure, tmp_path: Path) -> None:
     scene = tmp_path / "scene.toml"
     scene.write_text('kind = "earth-sun"\nsun_deg = [20, 10]\nnadir_deg = [-8, 12]\n')
     sun, nadir = measure("--scene", scene, *NOMINAL)
@@ -139,7 +139,7 @@ def ball(run: Run, *options: str) -> list[dict[str, float]]:
     return [json.loads(line) for line in out.splitlines()]
 
 
-def test_directions_and_profiles(run: Run) -> None:
+def test_ball_command_measures_all_directions_with_each_profile(run: Run) -> None:
     published = ball(run, "--profile", "published")
     mean = sum(line["offset_deg"] for line in published) / 4
     assert 0.04 < mean < 0.4  # published: 0.12 to 0.16

@@ -34,7 +34,7 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     assert emulator.process.returncode == 0
 
 
-def test_bench_client_of_the_document_downloads_the_nadir_picture(
+def test_documented_bench_client_downloads_the_nadir_image(
     served: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     text = (ROOT / "docs" / "sensors" / "protocols-cubesense.md").read_text(encoding="utf-8")
@@ -52,7 +52,7 @@ def test_bench_client_of_the_document_downloads_the_nadir_picture(
     assert picture[5, 5] < 50
 
 
-def test_node_protocol_and_escaped_bytes(served: Path) -> None:
+def test_serial_line_answers_node_protocol_with_escaped_bytes(served: Path) -> None:
     """Escaped bytes occur in an exposure of 0x1F1F."""
     with serial.Serial(str(served), 57_600, timeout=60) as port:
         port.write(bytes.fromhex("1F7F 80 1FFF"))
@@ -80,7 +80,7 @@ def test_node_protocol_and_escaped_bytes(served: Path) -> None:
 
 
 @pytest.mark.slow
-def test_registers_on_the_backup_uart(emulate: Emulate, tmp_path: Path) -> None:
+def test_registers_are_accessible_on_the_backup_uart(emulate: Emulate, tmp_path: Path) -> None:
     tty = tmp_path / "tty"
     with emulate("--uart", "registers", "--pty", "tty", "--pace", "fast"):
         with serial.Serial(str(tty), 115_200, timeout=60) as port:
@@ -124,7 +124,7 @@ def test_register_uart_leaves_the_node_protocol_to_i2c(ready: Open) -> None:
     target.close()
 
 
-def test_bench_download_equals_the_camera_picture(ready: Open) -> None:
+def test_bench_download_equals_the_camera_image(ready: Open) -> None:
     with ready() as opened:
         line = opened.board.serial("bench_uart")
         read = line.read
@@ -140,7 +140,7 @@ def test_bench_download_equals_the_camera_picture(ready: Open) -> None:
             np.testing.assert_array_equal(bench.download(camera), sent(opened, camera))
 
 
-def test_both_i2c_protocols_measure(ready: Open) -> None:
+def test_both_i2c_protocols_can_measure(ready: Open) -> None:
     with ready() as opened:
         bus = opened.board.i2c()
         node = CubeSense(I2cClient(bus, INTERFACE, wait=bus.wait))
@@ -154,7 +154,7 @@ def test_both_i2c_protocols_measure(ready: Open) -> None:
 
 
 @pytest.mark.slow
-def test_image_register_streams_the_picture(ready: Open) -> None:
+def test_image_register_streams_the_image(ready: Open) -> None:
     with ready() as opened:
         bus = opened.board.i2c()
         registers = RegisterClient(bus, REGISTERS, wait=bus.wait)

@@ -45,7 +45,7 @@ def test_replay_gives_the_same_answers(recorded, session):
         assert Replay(recorded, board.kernel, board.uarts, board.i2c_bus).run(INTERFACE) == []
 
 
-def test_clients_run_on_the_recording(recorded):
+def test_clients_run_against_a_recording(recorded):
     cubesense = CubeSense(NodeClient(RecordedTransport(recorded, INTERFACE), INTERFACE))
     assert cubesense.capture_and_detect(Camera.SUN).detected
     ServicePortClient(RecordedTransport(recorded, INTERFACE, "bench_uart")).take(Camera.NADIR)

@@ -70,7 +70,7 @@ def test_camera_measures_with_the_other_camera_and_its_own_memory_failed(
 
 
 @pytest.mark.parametrize("camera", Camera)
-def test_picture_in_the_other_memory_equals_the_camera_picture(opened: Any, camera: Camera) -> None:
+def test_image_in_the_other_memory_equals_the_camera_image(opened: Any, camera: Camera) -> None:
     other = Sram(1 - camera)
     opened.client.capture(camera, other)
     stored = held(opened.board, Camera(other))
@@ -83,7 +83,9 @@ DARK = EarthSunScene(nadir=(1, 0, 0), sun=(0, 0, 1))
 
 
 @pytest.mark.parametrize("gateware", ["as-flown", "corrected"])
-def test_coordinates_after_the_sun_disappears(ready: Open, gateware: str) -> None:
+def test_only_as_flown_gateware_keeps_sun_coordinates_without_a_sun(
+    ready: Open, gateware: str
+) -> None:
     with ready(FACING, profile="published", set=f"gateware={gateware}") as opened:
         assert opened.client.capture_and_detect(Camera.SUN).detected
         seen = opened.board.program.state.results[Camera.SUN].first

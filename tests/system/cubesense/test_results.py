@@ -25,7 +25,7 @@ TERMINATOR = EarthSunScene(sun=(1, 0, -0.3))
 DARK = EarthSunScene(nadir=(1, 0, 0), sun=(0, 0, 1))
 
 
-def test_result_codes_before_a_measurement(ready: Open) -> None:
+def test_result_codes_before_a_measurement_are_start_up_then_pending(ready: Open) -> None:
     with ready(NOON) as opened:
         cubesense = opened.client
         for camera in Camera:
@@ -71,7 +71,7 @@ RESULTS = {
 
 @pytest.mark.parametrize("profile", ["extended"])
 @pytest.mark.parametrize("name", RESULTS)
-def test_result_of_a_scene(ready: Open, name: str) -> None:
+def test_each_scene_yields_its_result_code(ready: Open, name: str) -> None:
     scene, expected = RESULTS[name]
     of_sun = expected == "SUN_NOT_FOUND" or name == "few beside the Sun"
     camera = Camera.SUN if of_sun else Camera.NADIR
@@ -118,7 +118,7 @@ def test_hot_pixels_do_not_change_a_direction(ready: Open, camera: Camera) -> No
 
 @pytest.mark.parametrize("profile", ["extended"])
 @pytest.mark.parametrize(("radius_px", "edges"), [(9.0, 0), (25.0, 2)])
-def test_light_beside_the_earth_is_left_out_of_the_limb(
+def test_light_beside_the_earth_is_excluded_from_the_limb(
     ready: Open, radius_px: float, edges: int
 ) -> None:
     (sample,) = LENSES[CameraTarget.NADIR].unproject([(511, 79)])
@@ -142,7 +142,7 @@ def test_light_beside_the_earth_is_left_out_of_the_limb(
         (-30.0, 221.0, (0.0, -30.0)),  # earlier: it is taken for the Sun
     ],
 )
-def test_first_bright_light_in_the_picture_is_taken_for_the_sun(
+def test_first_bright_light_in_the_image_is_taken_for_the_sun(
     ready: Open, beta: float, level: float, expected: tuple[float, float]
 ) -> None:
     light = Reflection(CameraTarget.SUN, 0.0, beta, radius_px=5.0, level=level)
@@ -191,7 +191,7 @@ def test_seed_determines_the_lenses_of_a_unit(ready: Open, profile: str) -> None
 
 
 @pytest.mark.slow
-def test_errors_of_published_lenses(measure: Measure) -> None:
+def test_errors_with_published_lenses_match_the_published_figures(measure: Measure) -> None:
     """Figures 7.1 and 7.3: the order of 0.14 deg at nadir; the Sun is found too far out."""
     errors = [
         frame[f"{axis}_deg"] - frame[f"truth_{axis}_deg"]

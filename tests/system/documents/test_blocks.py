@@ -94,7 +94,7 @@ def test_yaml_blocks_parse(block: Code) -> None:
 
 
 @pytest.mark.parametrize("block", of("sh"))
-def test_shell_blocks_parse(block: Code) -> None:
+def test_documented_shell_blocks_parse(block: Code) -> None:
     done = subprocess.run(["bash", "-n"], input=block.text, text=True, capture_output=True)
     assert done.stderr == ""
 
@@ -114,7 +114,7 @@ def test_other_programs_and_their_files_exist() -> None:
 
 
 @pytest.mark.parametrize(("document", "line"), OWN)
-def test_commands_parse(document: str, line: str, folder: Path) -> None:
+def test_documented_commands_parse(document: str, line: str, folder: Path) -> None:
     if re.search(r"\bglow\b", line):
         pytest.skip("a device of the text: tests/examples/test_adding_a_sensor.py")
     make_parser().parse_args(shlex.split(line))
@@ -139,14 +139,14 @@ def runnable() -> list[Any]:
     ]
 
 
-def test_exclusions_match_a_command() -> None:
+def test_every_exclusion_matches_a_documented_command() -> None:
     for left in NOT_HERE:
         assert any(re.search(left, line) for _, line in OWN), left
     assert len(runnable()) > 30
 
 
 @pytest.mark.parametrize(("document", "line"), runnable())
-def test_commands_run(document: str, line: str, folder: Path, run: Run) -> None:
+def test_documented_commands_run(document: str, line: str, folder: Path, run: Run) -> None:
     words = shlex.split(line)
     if words[:2] == ["run", "--"] and shutil.which(words[2]) is None:
         pytest.skip(f"no {words[2]}")
@@ -170,7 +170,9 @@ def python_of(document: str, first: str) -> str:
     return text
 
 
-def test_first_script_of_the_readme(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_readme_script_prints_the_attitude_and_stars(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     line = "emulate cubestar --pty ./ttyCUBESTAR"
     assert ("README.md", line) in OWN
     with Served(shlex.split(line)[1:], folder):
@@ -182,13 +184,13 @@ def test_first_script_of_the_readme(folder: Path, capsys: pytest.CaptureFixture[
     assert all(number.isdigit() for number in identified)
 
 
-def test_example_of_the_scenes_page(folder: Path) -> None:
+def test_documented_scene_example_runs(folder: Path) -> None:
     names: dict[str, Any] = {}
     exec(python_of("scenes.md", "import cubestack"), names)
     assert names["camera"].condition.temperature_c != -10  # the file's, which does not say it
 
 
-def test_examples_of_the_profiles_page() -> None:
+def test_documented_profile_examples_run() -> None:
     chosen = "cubestack.open_device("
     opened = eval(python_of("profiles.md", chosen), {"cubestack": cubestack})
     with opened:
@@ -197,7 +199,7 @@ def test_examples_of_the_profiles_page() -> None:
         assert opened.client.profile().profile == "mixed"
 
 
-def test_example_of_the_faults_page() -> None:
+def test_documented_fault_example_runs() -> None:
     with open_device("cubesense") as device:
         exec(python_of("faults.md", "fault = "), {"board": device.board})
         device.wait(6)
@@ -207,7 +209,7 @@ def test_example_of_the_faults_page() -> None:
 
 
 @pytest.mark.slow
-def test_example_of_the_hard_skies_page() -> None:
+def test_documented_hard_skies_example_runs() -> None:
     names: dict[str, Any] = {"cubestack": cubestack}
     exec(python_of("hard-skies.md", "frames = "), names)
     assert len(names["frames"]) == 20

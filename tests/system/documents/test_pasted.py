@@ -76,7 +76,7 @@ def test_lines_share_a_shell_and_report_exit_codes(done: dict[str, Pasted]) -> N
     }
 
 
-def test_output_is_reported(done: dict[str, Pasted]) -> None:
+def test_pasted_command_output_is_reported(done: dict[str, Pasted]) -> None:
     said = {line: one.said for line, one in done.items()}
     assert said["echo '$WORD' '>' 'written;' cat written"] == "kept"
     assert said["echo why it 'failed;' false"].strip() == "why it failed"
@@ -103,7 +103,9 @@ def test_timeout_interrupts_only_the_command(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("command", ["shell", "ground"])
-def test_client_without_a_server_is_skipped(tmp_path: Path, command: str) -> None:
+def test_documented_client_command_is_skipped_without_its_server(
+    tmp_path: Path, command: str
+) -> None:
     line = f"cubestack {command} ./tty --device cubestar"
     assert "another program serves" in left_out(line, tmp_path, long=False)
     (tmp_path / "tty").touch()

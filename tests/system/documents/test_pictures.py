@@ -41,7 +41,7 @@ def test_architecture_diagram_is_up_to_date() -> None:
     assert stored == architecture(), f"architecture.svg {STALE}"
 
 
-def test_caption_is_the_one_stored_in_the_picture() -> None:
+def test_readme_caption_equals_the_one_stored_in_the_hero_image() -> None:
     with Image.open(PICTURE) as picture:
         stored = picture.info["Description"]
     assert caption_of(README) == stored, "python -m docs.make_hero"

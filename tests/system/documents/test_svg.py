@@ -86,7 +86,7 @@ def at(time: float) -> float:
     return LEFT + WIDTH * (time - 1_000) / 1_000
 
 
-def test_levels_are_high_and_low_at_their_times(drawing: Drawing) -> None:
+def test_timing_diagram_wave_changes_at_the_right_times(drawing: Drawing) -> None:
     ack, low = map(wave, drawing.all("path", "wave"))
     high_y, low_y = ack[0][1], ack[2][1]
     assert high_y < low_y
@@ -98,7 +98,7 @@ def test_levels_are_high_and_low_at_their_times(drawing: Drawing) -> None:
     assert low[0][1] == low[1][1] > low_y
 
 
-def test_a_value_has_its_box_until_the_next_one(drawing: Drawing) -> None:
+def test_timing_diagram_draws_one_labelled_box_per_value(drawing: Drawing) -> None:
     found = [(one.left, one.right) for one in boxes(drawing, "box")]
     ends = [(1000, 1500), (1500, 2000), (1000, 1600), (1600, 1800), (1800, 2000)]
     for (left, right), (begin, end) in zip(found, ends, strict=True):
@@ -110,7 +110,7 @@ def test_a_value_has_its_box_until_the_next_one(drawing: Drawing) -> None:
         assert box.holds(x, y)
 
 
-def test_names_stand_left_of_their_lanes(drawing: Drawing) -> None:
+def test_timing_diagram_names_are_left_of_their_lanes(drawing: Drawing) -> None:
     names = drawing.texts("name")
     assert [name for name, *_ in names] == ["ACK", "state", "late", "low", "empty"]
     assert all(x < LEFT for _, x, _ in names)
@@ -125,7 +125,7 @@ def test_names_stand_left_of_their_lanes(drawing: Drawing) -> None:
     assert min(y for _, y in curve) < heights[0] < max(y for _, y in curve)
 
 
-def test_the_axis_has_marks_from_the_start_on(drawing: Drawing) -> None:
+def test_timing_axis_has_marks_from_the_start(drawing: Drawing) -> None:
     marks = drawing.texts("axis")
     assert [text for text, *_ in marks] == ["0", "0.25", "0.5", "0.75", "1 ns"]
     assert [x for _, x, _ in marks] == pytest.approx(
@@ -139,7 +139,7 @@ def test_the_axis_has_marks_from_the_start_on(drawing: Drawing) -> None:
         assert boxes(drawing, "box")[-1].bottom < float(bottom) <= drawing.height
 
 
-def test_everything_is_on_the_paper(drawing: Drawing) -> None:
+def test_diagram_texts_are_inside_the_drawing(drawing: Drawing) -> None:
     (paper,) = boxes(drawing, "paper")
     assert paper == (0, 0, drawing.width, drawing.height)
     assert drawing.width > LEFT + WIDTH
@@ -149,14 +149,14 @@ def test_everything_is_on_the_paper(drawing: Drawing) -> None:
 
 
 @pytest.mark.parametrize(("unit", "ps"), [("s", 1e12), ("ms", 1e9), ("us", 1e6), ("ns", 1e3)])
-def test_units_of_the_axis(unit: str, ps: float) -> None:
+def test_timing_axis_supports_each_unit(unit: str, ps: float) -> None:
     assert PS_PER[unit] == ps
     marks = Drawing(timing([], 0, int(2 * ps), unit, 1)).texts("axis")
     assert [text for text, *_ in marks] == ["0", "1", f"2 {unit}"]
 
 
 @pytest.mark.parametrize(("length", "told"), [(10, True), (11, False)])
-def test_a_word_is_written_where_it_fits(length: int, told: bool) -> None:
+def test_timing_value_is_labelled_only_if_its_text_fits(length: int, told: bool) -> None:
     lane = values("x", [(0, "w" * length), (80, "")])
     drawing = Drawing(timing([lane], 0, WIDTH, "ns", 1))
     assert bool(drawing.texts("value")) == told
@@ -164,7 +164,7 @@ def test_a_word_is_written_where_it_fits(length: int, told: bool) -> None:
 
 
 @pytest.mark.parametrize(("start", "end", "step"), [(5, 5, 1), (6, 5, 1), (0, 5, 0), (0, 5, -1)])
-def test_nothing_to_show_is_refused(start: int, end: int, step: float) -> None:
+def test_timing_diagram_rejects_an_empty_time_span(start: int, end: int, step: float) -> None:
     with pytest.raises(ValueError, match="nothing to show"):
         timing([], start, end, "ns", step)
 
@@ -190,7 +190,7 @@ def parts() -> Drawing:
     return Drawing(blocks(PARTS, LINES))
 
 
-def test_boxes_are_on_a_grid_and_apart(parts: Drawing) -> None:
+def test_diagram_boxes_are_aligned_and_do_not_overlap(parts: Drawing) -> None:
     a, b, c, d = boxes(parts, "box")
     assert {(one.right - one.left, one.bottom - one.top) for one in (a, b, c, d)} == {
         (BOX_WIDTH, BOX_HEIGHT)
@@ -204,7 +204,7 @@ def test_boxes_are_on_a_grid_and_apart(parts: Drawing) -> None:
     assert a.top == parts.height - c.bottom == a.left
 
 
-def test_titles_and_labels_stand_in_their_boxes(parts: Drawing) -> None:
+def test_diagram_titles_and_labels_are_inside_their_boxes(parts: Drawing) -> None:
     found = dict(zip(PARTS, boxes(parts, "box"), strict=True))
     titles = parts.texts("title")
     assert [text for text, *_ in titles] == ["A & B", "B", "C", "D"]
@@ -220,7 +220,7 @@ def test_titles_and_labels_stand_in_their_boxes(parts: Drawing) -> None:
     assert titles[1][2] > titles[0][2]
 
 
-def test_arrows_go_from_box_to_box_with_their_labels_beside(parts: Drawing) -> None:
+def test_diagram_arrows_connect_boxes_with_labels_beside_them(parts: Drawing) -> None:
     a, b, c, d = boxes(parts, "box")
     across, down, back, up = (one.attrib["d"] for one in parts.all("path", "line"))
     labels = {text: (x, y) for text, x, y in parts.texts("label")}
@@ -251,12 +251,12 @@ def test_no_text_is_over_another_or_a_line(parts: Drawing) -> None:
         assert apart, (one, other)
 
 
-def test_what_is_neither_beside_nor_below_is_refused() -> None:
+def test_diagram_rejects_diagonal_connections() -> None:
     with pytest.raises(ValueError, match="a and c are neither in one row nor in one column"):
         blocks(PARTS, [Line("a", "c", "")])
 
 
-def test_a_tall_box_has_its_lines_in_the_rows_of_the_others() -> None:
+def test_lines_to_a_tall_box_are_level_with_the_other_boxes() -> None:
     tall = {"a": Block(0, 0, "A"), "b": Block(0, 1, "B"), "tall": Block(1, 0, "T", rows=2)}
     drawing = Drawing(blocks(tall, [Line("a", "tall", ""), Line("tall", "b", "")]))
     a, b, high = boxes(drawing, "box")

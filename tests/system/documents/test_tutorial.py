@@ -67,7 +67,7 @@ def test_all_commands_are_tested() -> None:
     ]
 
 
-def test_measure_command_runs(folder: Path) -> None:
+def test_tutorial_measure_command_runs(folder: Path) -> None:
     assert "nadir" in done("cubestack measure cubesense --frames 3 --profile extended", folder)
 
 

@@ -66,7 +66,7 @@ def test_flipped_catalogue_bit_in_ram_is_found_and_reloaded(active: Tracker) -> 
 
 
 @pytest.mark.fault("memory-flip")
-def test_flipped_picture_bit_changes_one_bit(active: Tracker) -> None:
+def test_flipped_image_bit_changes_one_bit(active: Tracker) -> None:
     active.check()
     place = PICTURES_AT[active.board.program._camera.latest]
     number = 77

@@ -45,7 +45,7 @@ def test_memory_upsets_have_their_rate_and_keep_the_fit(quiet: Sense) -> None:
 
 
 @pytest.mark.fault("memory-stuck")
-def test_stuck_bit_is_in_every_picture(quiet: Sense) -> None:
+def test_stuck_bit_is_in_every_image(quiet: Sense) -> None:
     before = quiet.host_pixel(X, Y)
     level = 1 - (before >> 5 & 1)
     quiet.inject("memory-stuck", target="nadir", address=ADDRESS, bit=5, level=level)
@@ -168,7 +168,7 @@ def test_latched_up_camera_draws_current_until_reset(sense: Sense, camera: Camer
 
 @pytest.mark.fault
 @pytest.mark.parametrize("kind", ["uart-drop", "uart-corrupt", "uart-delay"])
-def test_faults_of_the_bench_line(sense: Sense, kind: str) -> None:
+def test_bench_line_faults_do_not_disturb_the_node_line(sense: Sense, kind: str) -> None:
     bench = ServicePortClient(sense.board.serial("bench_uart"), timeout_s=0.5)
     options: dict[str, Any] = {"delay_ms": 1000} if kind == "uart-delay" else {}
     sense.inject(kind, target="bench", direction="to-device", **options)

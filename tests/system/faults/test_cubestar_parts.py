@@ -58,7 +58,7 @@ def test_memory_upsets_have_their_rate(star: Star) -> None:
 
 @pytest.mark.parametrize("target", ["SRAM", "external"])
 @pytest.mark.fault("memory-stuck")
-def test_stuck_bit_is_in_every_picture(star: Star, good: np.ndarray, target: str) -> None:
+def test_stuck_bit_is_in_every_image(star: Star, good: np.ndarray, target: str) -> None:
     star.inject("memory-stuck", target=target, address=ADDRESS, bit=7)
     assert star.capture() == GOOD
     check_flipped(star, good, 0x80)
@@ -98,7 +98,7 @@ def test_register_flips_of_an_idle_fpga_have_no_effect(star: Star, good: np.ndar
 
 @pytest.mark.parametrize("profile", ["extended"])
 @pytest.mark.fault("register-upsets")
-def test_register_upsets_spoil_a_picture(star: Star, good: np.ndarray) -> None:
+def test_register_upsets_spoil_an_image(star: Star, good: np.ndarray) -> None:
     status, flags = star.capture_with("register-upsets", rate=10)
     assert len(star.faults.log) > 100
     assert status in ("IDENTIFICATION_FAILED", "DETECTION_FAILED")
@@ -137,7 +137,7 @@ def test_latch_up_is_switched_off_and_restored(star: Star, channel: str) -> None
 @pytest.mark.parametrize("at_s", [STORING_S, READING_S])
 @pytest.mark.parametrize("channel", ["imager", "memory"])
 @pytest.mark.fault("latch-up")
-def test_latch_up_during_a_capture_loses_the_picture(star: Star, channel: str, at_s: float) -> None:
+def test_latch_up_during_a_capture_loses_the_image(star: Star, channel: str, at_s: float) -> None:
     star.faults.inject("latch-up", target=channel, at_s=at_s)
     silent = (channel, at_s) == ("imager", STORING_S)  # ACK is waited for in vain
     more = {"ISDisableError"} if silent else set()
@@ -147,7 +147,7 @@ def test_latch_up_during_a_capture_loses_the_picture(star: Star, channel: str, a
 
 
 @pytest.mark.fault("latch-up")
-def test_a_lasting_latch_up_keeps_the_imager_off(star: Star) -> None:
+def test_persistent_latch_up_keeps_the_imager_off(star: Star) -> None:
     star.inject("latch-up", target="imager", lasting=True)
     assert star.capture() == ("CAPTURE_FAILED", {"OverCurrent", "ISSetupError"})
     assert star.telemetry("Identification")

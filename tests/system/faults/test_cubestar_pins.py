@@ -53,7 +53,7 @@ def test_missing_acknowledge_times_out(star: Star, kind: str, options: dict[str,
 
 @pytest.mark.parametrize("profile", ["extended"])
 @pytest.mark.fault("ack-stuck")
-def test_stuck_acknowledge_reads_noise_as_the_first_picture(star: Star, good: np.ndarray) -> None:
+def test_stuck_acknowledge_reads_noise_as_the_first_image(star: Star, good: np.ndarray) -> None:
     star.inject("ack-stuck", level=1)
     seen = watch_ack(star)
     status, flags = star.capture()
@@ -66,7 +66,7 @@ def test_stuck_acknowledge_reads_noise_as_the_first_picture(star: Star, good: np
 
 @pytest.mark.parametrize("profile", ["extended"])
 @pytest.mark.fault("ack-stuck")
-def test_stuck_acknowledge_reads_the_old_picture_again(star: Star) -> None:
+def test_stuck_acknowledge_reads_the_old_image_again(star: Star) -> None:
     assert star.capture() == GOOD
     before = star.device.attitude()
     star.board.camera.scene = SkyScene.pointing(90, -1)
@@ -103,7 +103,7 @@ def look_at(star: Star, pin: str, at_s: float, levels: list[int]) -> Any:
 
 @pytest.mark.parametrize("pin", ["ENABLE", "RNW"])
 @pytest.mark.fault("control-glitch")
-def test_glitch_during_read_restarts_the_picture(star: Star, good: np.ndarray, pin: str) -> None:
+def test_glitch_during_read_restarts_the_image(star: Star, good: np.ndarray, pin: str) -> None:
     star.faults.inject("control-glitch", target=pin, at_s=READING_S)
     status, flags = star.capture()
     assert status != "CAPTURE_FAILED"
@@ -160,7 +160,9 @@ def test_line_missing_in_one_frame_stores_the_next_frame(star: Star, good: np.nd
     ("kind", "value"), [("pixel-hot", 255), ("pixel-dead", 0), ("column-defect", 200)]
 )
 @pytest.mark.fault
-def test_bad_pixels_are_no_stars(star: Star, good: np.ndarray, kind: str, value: int) -> None:
+def test_faulty_pixels_are_not_detected_as_stars(
+    star: Star, good: np.ndarray, kind: str, value: int
+) -> None:
     brightest = divmod(int(good.argmax()), 1024)
     y, x = brightest if kind == "pixel-dead" else (Y, X)
     assert abs(int(good[y, x]) - value) > 50

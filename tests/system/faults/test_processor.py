@@ -35,12 +35,12 @@ def wait_for_resets(star: Star, count: int) -> None:
         star.client.pause(IN_BOOT_S / 2)
 
 
-def test_every_published_cause_has_its_number() -> None:
+def test_reset_causes_have_the_published_numbers() -> None:
     assert list(CAUSES) == list(ResetCause) == list(range(1, 11))
 
 
 @pytest.mark.parametrize("cause", CAUSES, ids=lambda cause: cause.name)
-def test_reset_cause_of_each_fault(star: Star, cause: ResetCause) -> None:
+def test_each_fault_reports_its_reset_cause(star: Star, cause: ResetCause) -> None:
     telecommand, faults = CAUSES[cause]
     star.client.pause(0.05)  # else the power-on would hide the rest
     if telecommand:
@@ -72,7 +72,7 @@ def test_hanging_program_answers_until_the_watchdog_reset(star: Star) -> None:
 @pytest.mark.parametrize("at_s", [STORING_S, READING_S])
 @pytest.mark.parametrize("target", ["brown-out", "lock-up"])
 @pytest.mark.fault("processor-reset")
-def test_reset_during_a_capture_loses_the_picture(star: Star, target: str, at_s: float) -> None:
+def test_reset_during_a_capture_loses_the_image(star: Star, target: str, at_s: float) -> None:
     star.faults.inject("processor-reset", target=target, at_s=at_s)
     star.client.command("CaptureImage")
     star.client.wait_processed(5.0)
@@ -107,7 +107,7 @@ def after(star: Star, *names: str, **parameters: Any) -> TaskStatus:
 
 
 @pytest.mark.fault("camera-dead")
-def test_task_states_of_a_dead_camera(star: Star) -> None:
+def test_dead_camera_is_shown_in_the_task_states(star: Star) -> None:
     star.inject("camera-dead")
     assert after(star, "TogglePowerSW", "TogglePowerSW") is TaskStatus.CAMERA_FAILED
     assert after(star, "Exposure", exposure=100) is TaskStatus.EXPOSURE_FAILED

@@ -61,7 +61,7 @@ def test_byte_lost_to_the_host_is_retried(bench: Bench) -> None:
 
 
 @pytest.mark.fault("uart-corrupt")
-def test_corrupted_byte_to_the_host(bench: Bench) -> None:
+def test_corrupted_byte_to_the_host_is_reported(bench: Bench) -> None:
     wire = bench.wire()
     bench.inject("uart-corrupt", direction="to-host", mask=0x80)
     assert bytes(byte ^ 0x80 for byte in wire.ask(ASK)) == wire.answered

@@ -42,7 +42,7 @@ def board(star: AnyEmulated) -> CubeStarFirmwareBoard:
     return star.board
 
 
-def test_serial_line_and_trace_channel(star: AnyEmulated) -> None:
+def test_firmware_uses_serial_line_and_trace_channel(star: AnyEmulated) -> None:
     lines: list[str] = []
     star.board.connect_console(lines.append)
     port = star.serial(timeout=0.05)
@@ -64,7 +64,7 @@ def test_semihosting_prints_when_enabled(elf: Path) -> None:
         open_device("cubestar", semihosting=True)
 
 
-def test_registers_of_the_camera(star: AnyEmulated) -> None:
+def test_firmware_reads_camera_registers(star: AnyEmulated) -> None:
     star.wait(0.02)
     board(star).camera.i2c_write(0x2C, b"\x85\x1c\x12\x34", board(star).kernel.now)
     assert answer(star, b"r") == b"%d\n" % 0x1234
@@ -72,7 +72,7 @@ def test_registers_of_the_camera(star: AnyEmulated) -> None:
     assert answer(star, b"r") == b"%d\n" % 0xFFFFFFFF
 
 
-def test_current_of_the_imager_by_the_adc(star: AnyEmulated) -> None:
+def test_firmware_measures_the_imager_current_by_adc(star: AnyEmulated) -> None:
     star.wait(0.02)
     shown = int(answer(star, b"m"))
     assert shown == pytest.approx(board(star).power.current_ma("imager"), abs=1)
@@ -89,7 +89,7 @@ def test_comparator_sees_a_latch_up_and_the_firmware_cuts_the_supply(star: AnyEm
     assert not board(star).power.is_on("imager")
 
 
-def test_watchdog_resets(star: AnyEmulated) -> None:
+def test_watchdog_resets_the_firmware(star: AnyEmulated) -> None:
     star.wait(0.02)
     assert answer(star, b"w", timeout_s=0.4) == b"stopped\nboot 16\n"
     assert star.board.processor.resets == 1
@@ -121,7 +121,7 @@ def test_polling_program_is_idle_after_a_while(star: AnyEmulated) -> None:
     assert star.board.busy()
 
 
-def test_wrong_rate_is_garbage_or_nothing(star: AnyEmulated) -> None:
+def test_serial_text_at_a_wrong_rate_is_not_understood(star: AnyEmulated) -> None:
     star.wait(0.02)
     port = star.board.serial()
     port._line.form = LineFormat(19200)
@@ -135,7 +135,7 @@ def test_wrong_rate_is_garbage_or_nothing(star: AnyEmulated) -> None:
     assert port.read(64, 0.0) == b"hello\n"
 
 
-def test_parity_is_that_of_the_registers(star: AnyEmulated) -> None:
+def test_line_parity_follows_the_usart_registers(star: AnyEmulated) -> None:
     star.wait(0.02)
     port = star.board.serial()
     port.write(b"e")
@@ -148,7 +148,7 @@ def test_parity_is_that_of_the_registers(star: AnyEmulated) -> None:
     assert port.read(64, 0.0) == b"hello\n"
 
 
-def test_upsets_of_core_and_memories_never_end_the_emulator(elf: Path) -> None:
+def test_core_and_memory_upsets_never_crash_the_emulator(elf: Path) -> None:
     for seed in range(6):
         with open_device("cubestar", firmware=str(elf), seed=seed) as star:
             star.faults.inject("core-upsets", rate=5.0)
@@ -159,7 +159,7 @@ def test_upsets_of_core_and_memories_never_end_the_emulator(elf: Path) -> None:
             assert star.faults.events > 10
 
 
-def test_same_seed_same_trace(elf: Path, tmp_path: Path) -> None:
+def test_same_seed_repeats_the_firmware_trace(elf: Path, tmp_path: Path) -> None:
     def recorded(name: str) -> tuple[str, int, int]:
         path = tmp_path / name
         with open_device("cubestar", firmware=str(elf), seed=5) as star:
@@ -203,6 +203,6 @@ def test_bad_image_prints_one_line(
     assert "has no vector table" in error
 
 
-def test_own_firmware_has_no_profile(elf: Path) -> None:
+def test_custom_firmware_rejects_a_profile(elf: Path) -> None:
     with pytest.raises(ValueError, match="no profile and no switches"):
         cubestack.open_device("cubestar", firmware=str(elf), profile="extended")

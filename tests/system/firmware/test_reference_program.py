@@ -125,7 +125,7 @@ def test_a_latch_up_is_cut_off_and_healed(
     assert raised(node) == {"OverCurrent"}
 
 
-def test_rejects_other_profiles(node: NodeClient) -> None:
+def test_reference_firmware_rejects_other_profiles(node: NodeClient) -> None:
     shown = node.telemetry("Profile")
     perform(node, "SetProfile", Profile="PUBLISHED")
     with pytest.raises(CommandRefusedError):
@@ -135,7 +135,7 @@ def test_rejects_other_profiles(node: NodeClient) -> None:
     assert node.telemetry("Profile") == shown
 
 
-def test_picture_upload_and_download(node: NodeClient) -> None:
+def test_image_upload_and_download(node: NodeClient) -> None:
     perform(node, "UploadImage")
     data = bytes(range(128))
     perform(node, "UploadBlock", BlockNumber=4000, Data=data)
@@ -171,7 +171,7 @@ def test_invalid_messages_are_answered_and_flagged(
     assert raised(client) == flags
 
 
-def test_telemetry_and_telecommands_over_i2c(star: AnyEmulated, node: NodeClient) -> None:
+def test_reference_firmware_answers_over_i2c(star: AnyEmulated, node: NodeClient) -> None:
     bus = star.smbus()
     address = INTERFACE.i2c_address
     assert bus.read_i2c_block_data(address, 128, 4) == [5, 3, 0, 1]
@@ -184,7 +184,9 @@ def test_telemetry_and_telecommands_over_i2c(star: AnyEmulated, node: NodeClient
     assert raised(node) == wanted
 
 
-def test_conformance_of_telemetry_and_framing(star: AnyEmulated, node: NodeClient) -> None:
+def test_reference_firmware_passes_the_conformance_checks(
+    star: AnyEmulated, node: NodeClient
+) -> None:
     notes = device("cubestar").conformance
     target = Target("emulated", INTERFACE, node, controls=EmulatedControls(star))
     run = CheckRun(target, notes=notes)
@@ -195,12 +197,12 @@ def test_conformance_of_telemetry_and_framing(star: AnyEmulated, node: NodeClien
 
 
 @pytest.mark.parametrize("program", ["plain_pyserial.py"])
-def test_programs_of_the_examples_run_on_it(star: AnyEmulated, program: str) -> None:
+def test_example_programs_run_on_the_reference_firmware(star: AnyEmulated, program: str) -> None:
     done = star.run(sys.executable, ROOT / "examples" / program, "{port}")
     assert (done.returncode, done.stderr) == (0, "")
 
 
-def test_telemetry_of_pictures_matches_in_every_mode() -> None:
+def test_reference_firmware_telemetry_matches_in_every_mode() -> None:
     found = list(compare(3, 16, "reference"))
     assert [one.differences for one in found] == [[]] * 3
     assert {one.mode for one in found} == {"lost", "assisted", "as it stands"}
@@ -208,7 +210,7 @@ def test_telemetry_of_pictures_matches_in_every_mode() -> None:
     assert all(one.stars > 3 for one in found)
 
 
-def test_measured_skies_give_the_same_quaternions() -> None:
+def test_reference_firmware_measures_the_same_quaternions() -> None:
     options = {"frames": 3, "seed": 7, "no_noise": True, "threshold": 16}
     both = [
         [

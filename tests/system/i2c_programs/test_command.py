@@ -14,7 +14,7 @@ from ...conftest import Run
 from .conftest import COMMAND, TIMEOUT_S, start
 
 
-def test_faults_of_the_bus_reach_the_program(run: Run, tmp_path: Path) -> None:
+def test_i2c_fault_plan_reaches_the_guest_program(run: Run, tmp_path: Path) -> None:
     plan = tmp_path / "faults.toml"
     plan.write_text('seed = 1\n[[fault]]\nkind = "i2c-stretch"\nstretch_us = 2e6\n')
     script = "import smbus2\ntry: smbus2.SMBus(7).read_byte(26)\nexcept OSError as e: print(e)"
@@ -22,7 +22,7 @@ def test_faults_of_the_bus_reach_the_program(run: Run, tmp_path: Path) -> None:
     assert outcome.out == f"[Errno {errno.ETIMEDOUT}] Connection timed out\n"
 
 
-def test_exit_codes_and_streams(route: str, served: Path) -> None:
+def test_run_passes_exit_status_and_streams_through(route: str, served: Path) -> None:
     script = "read line; echo out $line; echo err >&2; exit 7"
     options = ("--quiet", "--route", route, "--attach", served)
     outcome = start(*options, "--", "sh", "-c", script, given="in\n")

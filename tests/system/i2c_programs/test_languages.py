@@ -47,7 +47,7 @@ print("done")
 """
 
 
-def test_smbus2(run: Run) -> None:
+def test_smbus2_program_runs_on_the_emulated_bus(run: Run) -> None:
     assert run(sys.executable, "-c", PYTHON_CLIENT) == (0, "done\n", "")
 
 
@@ -62,7 +62,9 @@ def test_cube_smbus_finds_the_bus_of_its_environment(run: Run, served: Path) -> 
 
 @needs_c
 @pytest.mark.parametrize("link", ["-static", "-dynamic"])
-def test_c_program(run: Run, route: str, tmp_path: Path, link: str) -> None:
+def test_c_program_reads_the_emulated_i2c_bus(
+    run: Run, route: str, tmp_path: Path, link: str
+) -> None:
     program = tmp_path / "client"
     compiler = find_c_compiler()
     assert compiler is not None

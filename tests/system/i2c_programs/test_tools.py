@@ -142,19 +142,19 @@ def check(run: Run, folder: Path, session: Session, *options: object) -> None:
         assert (line, answer.strip()) == (line, f"{code}: {expected}".strip())
 
 
-def test_session_with_one_device(run: Run, tmp_path: Path) -> None:
+def test_i2c_tools_session_with_one_device(run: Run, tmp_path: Path) -> None:
     assert len(SESSION) > 30
     check(run, tmp_path, SESSION, "--pace", "fast")
 
 
-def test_session_with_several_devices(run: Run, tmp_path: Path) -> None:
+def test_i2c_tools_session_with_several_devices(run: Run, tmp_path: Path) -> None:
     devices = [f"--device={name}" for name in ("cubestar", "cubesense", "aramis")]
     options = ("--bus", 12, "--hz", 400_000, "--nack-errno", "EREMOTEIO")
     move = ("--i2c-addr", "cubestar=0x2b")
     check(run, tmp_path, SHARED_SESSION, *options, *devices, *move)
 
 
-def test_general_call(run: Run, served: Path, tmp_path: Path) -> None:
+def test_i2c_tools_reach_a_device_by_general_call(run: Run, served: Path, tmp_path: Path) -> None:
     session = (
         ("i2cdetect -y 7", 0, grid(0x1A, LATCH)),
         ("i2cset -y -a 7 0x00 0x5a", 0, ""),

@@ -50,7 +50,7 @@ def test_proper_motion_moves_stars() -> None:
     assert np.degrees(alpha_centauri) * 3600 == pytest.approx(26 * 3.7, rel=0.02)
 
 
-def test_each_field_keeps_its_brightest() -> None:
+def test_catalogue_keeps_the_brightest_stars_of_each_field() -> None:
     sky = load_sky(SMALL.epoch)
     bright = np.flatnonzero(sky.v_mag <= SMALL.mag_limit)
     expected = set()
@@ -76,7 +76,7 @@ def test_lists_every_triangle_within_the_limits(small: Database) -> None:
     assert len(small) == len(expected)
 
 
-def test_areas_moments_and_their_order(small: Database) -> None:
+def test_stored_areas_and_moments_are_right_and_sorted(small: Database) -> None:
     corners = small.vectors.astype(np.float64)[small.stars]
     first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     areas = np.linalg.norm(np.cross(first, second), axis=1) / 2
@@ -88,7 +88,7 @@ def test_areas_moments_and_their_order(small: Database) -> None:
     assert sorted(small.moment_triangles.tolist()) == list(range(len(small)))
 
 
-def test_faces_are_those_of_the_middles(small: Database) -> None:
+def test_triangles_lie_in_the_face_nearest_to_their_centre(small: Database) -> None:
     middles = small.vectors[small.stars].mean(axis=1)
     middles /= np.linalg.norm(middles, axis=1, keepdims=True)
     distances = np.linalg.norm(middles[:, None] - small.sphere.centres, axis=2)
@@ -96,7 +96,7 @@ def test_faces_are_those_of_the_middles(small: Database) -> None:
     np.testing.assert_allclose(chosen, distances.min(axis=1), atol=1e-5)
 
 
-def test_a_shorter_side_leaves_fewer_triangles(small: Database) -> None:
+def test_shorter_longest_side_leaves_fewer_triangles(small: Database) -> None:
     fewer = build_database(replace(SMALL, longest_side_deg=15))
     assert 0 < len(fewer) < len(small)
     assert len(fewer.numbers) == len(small.numbers)

@@ -133,7 +133,7 @@ def test_unrelated_change_does_not_disturb_the_frame() -> None:
 
 
 @pytest.mark.parametrize("start_ms", [0, 40, 66])
-def test_the_sensor_s_frame_ends_when_its_last_pixel_comes(start_ms: int) -> None:
+def test_ppi_frame_ends_with_its_last_pixel(start_ms: int) -> None:
     sky = SkyScene([0, 0, 0, 1], mag_limit=3.0)
     bench = Bench(Mt9m001(sky, condition=replace(CONDITION, noise=False)))
     target = np.zeros((1024, 1280), np.uint8)

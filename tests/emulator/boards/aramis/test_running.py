@@ -65,7 +65,7 @@ def test_downloaded_images_equal_the_captured_ones(active: Desk) -> None:
     assert {len(block) for block in streamed} == {128}
 
 
-def test_the_loop_runs_at_1_hz(active: Desk) -> None:
+def test_loop_runs_at_1_hz(active: Desk) -> None:
     active.client.command("StartLoop", Period=1000, Mode=MeasurementMode.AIDED)
     active.client.pause(10)
     status = active.client.telemetry("LoopStatus")
@@ -133,11 +133,11 @@ def test_every_telemetry_frame_can_be_read_at_any_time(desk: Desk) -> None:
             assert set(desk.client.telemetry(message.name)) == {f.name for f in message.fields}
 
 
-def test_every_telecommand_has_an_effect(desk: Desk) -> None:
+def test_every_aramis_telecommand_has_a_handler(desk: Desk) -> None:
     assert desk.board.program.commands.handled == {m.name for m in INTERFACE.telecommands}
 
 
-def test_the_times_of_the_steps_add_up(active: Desk) -> None:
+def test_aramis_phase_times_add_up_to_the_total(active: Desk) -> None:
     active.aramis.measure()
     times = active.aramis.phase_times()
     total = times.pop("total")
@@ -170,7 +170,7 @@ def test_changed_image_settings_restart_the_background(
     assert len(begun) == 1
 
 
-def test_power_follows_what_runs(desk: Desk) -> None:
+def test_average_power_rises_while_the_loop_runs(desk: Desk) -> None:
     desk.client.pause(1.0)
     resting_ma = desk.board.power.charge_mas() / desk.now_s
     desk.aramis.activate()
@@ -205,7 +205,7 @@ PAGE = Path(__file__).parents[4] / "docs" / "sensors" / "protocols-aramis.md"
 NEXT_S = 1.5  #: From one request to the next: a measurement is over by then
 
 
-def test_examples_of_the_page() -> None:
+def test_documented_aramis_protocol_examples_work() -> None:
     blocks = re.findall(r"```wire\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
     lines = [line for block in blocks for line in block.splitlines()]
     sent, received = ([line[3:] for line in lines if line[:3] == way] for way in ("-> ", "<- "))
@@ -221,7 +221,7 @@ def test_examples_of_the_page() -> None:
         line.read(1, NEXT_S)
 
 
-def test_the_page_names_every_use_case_s_telecommands() -> None:
+def test_documentation_names_every_use_case_telecommand() -> None:
     text = PAGE.read_text(encoding="utf-8")
     for name in ("Activate", "SetSystemTime", "GetAttitude", "LatchUpAction", "SetBodyRotation"):
         assert name in text

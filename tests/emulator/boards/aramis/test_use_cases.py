@@ -11,7 +11,7 @@ from cubestack.firmware_model.interface.aramis import CatalogueState, LatchUpSte
 from .conftest import ORION, Desk
 
 
-def test_activate_measure_deactivate(desk: Desk) -> None:
+def test_aramis_activates_measures_and_deactivates(desk: Desk) -> None:
     desk.client.pause(0.1)
     status = desk.client.telemetry("SensorStatus")
     assert (status["State"], status["Catalogue"]) == (codes.SensorState.INACTIVE, 0)
@@ -38,7 +38,7 @@ def test_measurement_without_activation_is_reported(desk: Desk) -> None:
     assert desk.client.telemetry("LoopStatus")["Running"] == 0
 
 
-def test_rough_directions_as_vector_and_as_angles(active: Desk) -> None:
+def test_measure_accepts_a_rough_direction_as_vector_or_angles(active: Desk) -> None:
     boresight = np.array([0.104, 0.994, -0.017])
     for near in ({"near": boresight}, {"near_rad": (1.466, -0.017)}):
         found = active.aramis.measure(**near)  # type: ignore[arg-type]
@@ -51,7 +51,7 @@ def test_rough_directions_as_vector_and_as_angles(active: Desk) -> None:
         active.aramis.measure(boresight, near_rad=(0.0, 0.0))
 
 
-def test_the_answer_carries_the_image_s_time(active: Desk) -> None:
+def test_attitude_answer_has_the_time_of_the_image(active: Desk) -> None:
     assert active.aramis.julian_date() is None
     assert active.aramis.measure().julian_date is None
     active.aramis.set_time(2_461_366.75)
@@ -65,7 +65,7 @@ def test_the_answer_carries_the_image_s_time(active: Desk) -> None:
     assert (now - 2_461_366.75) * 86_400 == pytest.approx(active.now_s - set_at_s, abs=0.03)
 
 
-def test_the_body_s_attitude_is_turned_by_the_loaded_rotation(active: Desk) -> None:
+def test_body_attitude_includes_the_loaded_body_rotation(active: Desk) -> None:
     turn = Rotation.from_euler("xyz", [20, -40, 75], degrees=True)
     assert active.aramis.body_quaternion() is None
     active.aramis.measure()
@@ -81,7 +81,7 @@ def test_the_body_s_attitude_is_turned_by_the_loaded_rotation(active: Desk) -> N
     assert active.client.telemetry("ExtendedIdentification")["ResetCause"] == 2
 
 
-def test_latch_up_action(active: Desk) -> None:
+def test_latch_up_action_switches_the_camera_supply(active: Desk) -> None:
     assert active.client.telemetry("SupplyStatus")["Current"] == 110.0
     active.board.power.latch_up("camera", 300.0)
     assert active.client.telemetry("SupplyStatus")["Current"] == 410.0
@@ -169,7 +169,7 @@ def test_upsets_in_ram_are_found_before_the_next_match(active: Desk) -> None:
     assert active.client.telemetry("CatalogueStatus")["RamErrors"] == 1
 
 
-def test_the_catalogue_is_reloaded_periodically_and_can_be_refreshed(active: Desk) -> None:
+def test_catalogue_is_reloaded_periodically_and_can_be_refreshed(active: Desk) -> None:
     active.client.command("SetReloadPeriod", Period=2)
     active.flip_flash(100, 3)
     active.client.pause(7)

@@ -40,7 +40,7 @@ def let_pass(board: CubeSenseBoard, ms: float) -> None:
     board.kernel.advance_to(board.kernel.now + int(ms * PS_PER_MS))
 
 
-def test_starts_with_the_processor_in_reset_and_everything_switched_off() -> None:
+def test_board_starts_in_reset_with_all_supplies_off() -> None:
     board = CubeSenseBoard(EarthSunScene())
     assert not any(board.power.is_on(channel) for channel in CHANNELS.values())
     for ms in (0, BOOT_US / 1000 - 0.01):
@@ -49,17 +49,19 @@ def test_starts_with_the_processor_in_reset_and_everything_switched_off() -> Non
     board.close()
 
 
-def test_firmware_switches_everything_on_at_the_published_power(board: CubeSenseBoard) -> None:
+def test_firmware_switches_all_channels_on_at_the_published_power(board: CubeSenseBoard) -> None:
     assert all(board.power.is_on(channel) for channel in CHANNELS.values())
     assert board.power.current_ma() * 5.0 == pytest.approx(359.5, rel=0.06)
 
 
-def test_the_firmware_has_set_the_cameras_by_their_control_lines(board: CubeSenseBoard) -> None:
+def test_firmware_has_set_the_camera_exposures_over_their_control_lines(
+    board: CubeSenseBoard,
+) -> None:
     shutters = [board.cameras[camera].frame_from(board.kernel.now) for camera in Camera]
     assert [shutter.exposure_lines for shutter in shutters] == [2, 8]
 
 
-def test_monitors_show_what_the_parts_draw(board: CubeSenseBoard) -> None:
+def test_current_monitors_measure_the_drawn_currents(board: CubeSenseBoard) -> None:
     shown = {one: board.hardware.adc_counts(one) * MA_PER_COUNT for one in Monitor}
     whole_ma = shown[Monitor.SUPPLY_5V]
     assert shown[Monitor.SRAM1] == pytest.approx(4.6, abs=MA_PER_COUNT)
@@ -72,7 +74,9 @@ def test_monitors_show_what_the_parts_draw(board: CubeSenseBoard) -> None:
 
 @pytest.mark.parametrize("camera", Camera)
 @pytest.mark.parametrize("sram", Sram)
-def test_a_picture_takes_current(board: CubeSenseBoard, camera: Camera, sram: Sram) -> None:
+def test_storing_an_image_draws_memory_and_fpga_current(
+    board: CubeSenseBoard, camera: Camera, sram: Sram
+) -> None:
     """Storing takes it in one memory; FPGAs take it on their own, or both of them linked."""
     idle_ma = board.power.current_ma()
     board.serial().write(bytes([0x1F, 0x7F, 20, camera, sram, 0x1F, 0xFF]))
@@ -143,7 +147,7 @@ def test_truth_describes_the_stored_frame(board: CubeSenseBoard) -> None:
     assert board.truth(Camera.SUN) is None
 
 
-def test_ports_are_separate(board: CubeSenseBoard) -> None:
+def test_node_and_bench_ports_are_separate(board: CubeSenseBoard) -> None:
     node, bench = board.serial(), board.serial("bench_uart")
     board.hardware.uart_send(b"bench", Port.BENCH)
     board.hardware.uart_send(b"node")
@@ -152,7 +156,7 @@ def test_ports_are_separate(board: CubeSenseBoard) -> None:
     assert (node.read(10, 0.1), bench.read(10, 0.0)) == (b"node", b"ench")
 
 
-def test_both_protocols_have_an_address_of_their_own(board: CubeSenseBoard) -> None:
+def test_each_protocol_has_its_own_address(board: CubeSenseBoard) -> None:
     from smbus2 import i2c_msg
 
     bus = board.i2c()
@@ -162,7 +166,7 @@ def test_both_protocols_have_an_address_of_their_own(board: CubeSenseBoard) -> N
     assert (list(identification)[1], list(threshold)) == (2, [225])  # interface version first
 
 
-def test_busy_only_while_working(board: CubeSenseBoard) -> None:
+def test_board_is_busy_only_while_working(board: CubeSenseBoard) -> None:
     assert not board.busy()
     board.serial().write(DETECT)
     for ms, busy in ((0, True), (50, True), (500, False)):
@@ -195,7 +199,7 @@ def test_lines_are_open_drain(board: CubeSenseBoard) -> None:
     assert (lines.get_pin(sda), lines.get_pin(scl)) == (1, 1)
 
 
-def test_a_reset_lets_control_lines_rise_and_switches_everything_off() -> None:
+def test_reset_releases_control_lines_and_switches_supplies_off() -> None:
     lines: dict[tuple[Camera, str], int] = {}
     switched: dict[str, bool] = {}
 

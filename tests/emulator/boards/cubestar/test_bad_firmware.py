@@ -43,7 +43,7 @@ CASES = {
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_bad_firmware(name):
+def test_faulty_firmware_is_diagnosed_in_a_few_lines(name):
     program, *report = CASES[name]
     image = bytes(Program(f"{START_UP}; {program}; b .").image)
     board = CubeStarFirmwareBoard(SKY, Image(((0, image),)), seed=1)

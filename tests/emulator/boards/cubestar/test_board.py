@@ -92,14 +92,16 @@ def test_pixels_sent_before_power_loss_are_stored(monkeypatch: pytest.MonkeyPatc
     assert dark_rows.tolist() == [row < sent - 1 for row in range(512)]
 
 
-def test_published_number_of_stars() -> None:
+def test_onboard_catalogue_has_the_published_405_stars() -> None:
     listed = set(onboard_catalogue().hip.tolist())
     assert len(listed) == 405
     assert listed & {71681, 71683} == {71683}  # of alpha Centauri's stars, A alone
 
 
 @pytest.mark.parametrize(("one", "other", "apart"), [(31, 401, 0.695071), (32, 92, 0.700600)])
-def test_published_numbers_and_distances_of_stars(one: int, other: int, apart: float) -> None:
+def test_onboard_catalogue_has_the_published_star_numbers_and_distances(
+    one: int, other: int, apart: float
+) -> None:
     # Table 4.3, where stars are counted from 1; alpha Centauri is between stars 92 and 401.
     listed = onboard_catalogue(epoch=CATALOGUE_EPOCH)
     first, second = listed.vectors[[one - 1, other - 1]].astype(float)
@@ -148,7 +150,9 @@ def settings(board: LayoutBoard) -> list[dict[str, int]]:
     ],
 )
 @pytest.mark.parametrize("accessed", [False, True])
-def test_the_published_board(enable: int, rnw: int, fpga: str, memory: str, accessed: bool) -> None:
+def test_published_layout_draws_current_by_fpga_and_memory_state(
+    enable: int, rnw: int, fpga: str, memory: str, accessed: bool
+) -> None:
     board = BOARDS[Layout.COPIED]
     found = current_ma(board, {"ENABLE": enable, "RNW": rnw}, accessed)
     assert found == pytest.approx(REST + FPGA[fpga] + SRAM[memory])
@@ -197,5 +201,7 @@ def test_two_memories_at_one_fpga_exceed_its_pins() -> None:
 @pytest.mark.parametrize(
     ("pins", "tiles", "fits"), [(77, 768, True), (78, 768, False), (77, 769, False), (1, 1, True)]
 )
-def test_a_design_fits_up_to_the_last_pin_and_tile(pins: int, tiles: int, fits: bool) -> None:
+def test_design_fits_only_within_the_pins_and_tiles_of_the_part(
+    pins: int, tiles: int, fits: bool
+) -> None:
     assert Fpga(pins, tiles, 77, 768).fits is fits

@@ -88,7 +88,9 @@ def session(board: CubeStarFirmwareBoard, endpoint: GdbEndpoint, script: str) ->
 
 
 @needs_gdb
-def test_typical_debugging_session(board: CubeStarFirmwareBoard, endpoint: GdbEndpoint) -> None:
+def test_gdb_session_loads_breaks_watches_and_injects_faults(
+    board: CubeStarFirmwareBoard, endpoint: GdbEndpoint
+) -> None:
     send_bytes(board, b"abc")
     said = session(
         board,
@@ -115,7 +117,9 @@ def test_typical_debugging_session(board: CubeStarFirmwareBoard, endpoint: GdbEn
 
 
 @needs_gdb
-def test_time_passes_in_stepped_sleep(board: CubeStarFirmwareBoard, endpoint: GdbEndpoint) -> None:
+def test_time_advances_while_stepping_through_sleep(
+    board: CubeStarFirmwareBoard, endpoint: GdbEndpoint
+) -> None:
     said = session(
         board,
         endpoint,
@@ -127,7 +131,9 @@ def test_time_passes_in_stepped_sleep(board: CubeStarFirmwareBoard, endpoint: Gd
 
 
 @needs_gdb
-def test_caught_fault_is_a_signal(board: CubeStarFirmwareBoard, endpoint: GdbEndpoint) -> None:
+def test_caught_fault_is_reported_to_gdb_as_a_signal(
+    board: CubeStarFirmwareBoard, endpoint: GdbEndpoint
+) -> None:
     send_bytes(board, b"a\0")
     script = "monitor catch on; continue; backtrace; monitor report; monitor catch off"
     said = session(board, endpoint, script)
@@ -226,7 +232,7 @@ def test_second_client_is_rejected(board: CubeStarFirmwareBoard, endpoint: GdbEn
         client.close()
 
 
-def test_the_port_is_on_this_machine_only(endpoint: GdbEndpoint) -> None:
+def test_gdb_port_listens_on_loopback_only(endpoint: GdbEndpoint) -> None:
     assert endpoint.address[0] == "127.0.0.1"
 
 

@@ -57,7 +57,9 @@ def test_fpga_behaves_the_same_by_driver_callbacks_and_simulation(images: dict[s
     assert toggled(images["toggle"], engine="python") == compiled
 
 
-def test_picture_goes_through_the_fpga_into_the_external_memory(images: dict[str, Image]) -> None:
+def test_firmware_reads_the_image_through_the_fpga_into_external_memory(
+    images: dict[str, Image],
+) -> None:
     board = powered(images["picture"], engine="compiled")
     while not results(board) and board.kernel.now < PS_PER_S:
         board.kernel.advance_to(board.kernel.now + 20 * PS_PER_MS)
@@ -87,7 +89,7 @@ def test_pin_faults_are_seen_and_leave_no_residue(images: dict[str, Image]) -> N
     board.close()
 
 
-def test_upsets_of_code_are_executed(images: dict[str, Image]) -> None:
+def test_flipped_code_bits_are_executed(images: dict[str, Image]) -> None:
     board = powered(images["toggle"], engine="compiled")
     board.kernel.advance_to(PS_PER_MS * 4 // 10)  # it has executed them before
     address = int.from_bytes(board.machine.flash[4:8].tobytes(), "little") & ~1

@@ -33,7 +33,7 @@ SKY = load_sky(2026.0)
 ORION = replace(SkyScene.pointing(83.8, -1.0), mag_limit=3.8)
 
 
-def test_an_exposure_goes_on_from_its_beginning_to_its_end() -> None:
+def test_exposure_phases_0_and_1_are_its_begin_and_end() -> None:
     begin, middle, end = (exposure._time_ps(LENS, LONG, phase) for phase in (0.0, 0.5, 1.0))
     assert middle == LONG.mid_exposure_ps((LENS.rows - 1) / 2)
     assert end - middle == middle - begin == pytest.approx(LONG.exposure_s * 1e12 / 2)
@@ -86,7 +86,7 @@ def brute_force(scene: SkyScene, shutter: RollingShutter, instants: int) -> np.n
     return image
 
 
-def test_stars_are_where_scipy_and_the_lens_put_them() -> None:
+def test_star_pixels_equal_scipy_rotation_and_lens_projection() -> None:
     scene = replace(SkyScene.pointing(83.8, -1.0, 40.0), mag_limit=3.0)
     hips, pixels = star_pixels(scene, LENS, LONG)
     axes = Rotation.from_quat(np.asarray(scene.quaternion))
@@ -96,7 +96,7 @@ def test_stars_are_where_scipy_and_the_lens_put_them() -> None:
         np.testing.assert_allclose(pixel, expected, atol=1e-9)
 
 
-def test_orion_stands_upright() -> None:
+def test_orion_appears_upright() -> None:
     hips, pixels = star_pixels(ORION, LENS, LONG)
     place = dict(zip(hips, pixels, strict=True))
     rigel, betelgeuse, bellatrix = place[24436], place[27989], place[25336]
@@ -117,7 +117,7 @@ def test_light_of_a_star_is_complete_and_centred() -> None:
         np.testing.assert_allclose(centroid, (x, y), atol=1e-4)
 
 
-def test_spot_is_the_gaussian_over_each_pixels_square_and_defocus_widens_it() -> None:
+def test_star_spot_is_a_pixel_integrated_gaussian_of_the_psf_width() -> None:
     scene = vega_at((400.3, 200.8), 0.0, (0, 0, 0))
     np.testing.assert_allclose(light(scene), brute_force(scene, LONG, 1), atol=0.3)
     assert light(scene).max() > 50_000
@@ -134,7 +134,7 @@ def test_spot_is_the_gaussian_over_each_pixels_square_and_defocus_widens_it() ->
     "rate",
     quick(map(pytest.param, [(2, 0, 0), (-2, 0, 0), (1.0, 0.7, 5.0), (0, -2, 0), (0, 0, 6)]), 2),
 )
-def test_streak_against_brute_force(rate: tuple[float, ...]) -> None:
+def test_star_streak_equals_brute_force(rate: tuple[float, ...]) -> None:
     # Long lines make the rolling shutter plain to see.
     shutter = RollingShutter(2 * 10**12, 4 * LINE, 700, 700)
     scene = vega_at((800.0, 430.0), 1.9, rate)
@@ -175,7 +175,7 @@ def test_static_scene_does_not_depend_on_time() -> None:
     np.testing.assert_array_equal(light(ORION), light(ORION, later))
 
 
-def test_poses_follow_each_other() -> None:
+def test_exposure_uses_the_pose_at_its_time() -> None:
     poses = (Pose(ORION.quaternion, at_s=5.0),)
     scene = replace(SkyScene.pointing(10.0, 20.0), poses=poses, mag_limit=3.8)
     late = replace(LONG, readout_ps=6 * 10**12)
@@ -183,7 +183,7 @@ def test_poses_follow_each_other() -> None:
     assert np.abs(light(scene) - light(ORION)).max() > 1000
 
 
-def test_stars_at_the_limit_and_at_the_detection_limit() -> None:
+def test_stars_at_the_magnitude_limits_have_the_expected_counts() -> None:
     # A V 3.8 star: about 300 counts of 8 bits in the default exposure; V 8: below one at its peak.
     hip = int(SKY.hip[np.abs(SKY.v_mag - 3.8).argmin()])
     x, y, z = star(hip)
@@ -195,14 +195,14 @@ def test_stars_at_the_limit_and_at_the_detection_limit() -> None:
     assert peak / ELECTRONS_PER_DN12 / DN12_PER_DN8 < 1.3
 
 
-def test_magnitude_limit_leaves_stars_out() -> None:
+def test_magnitude_limit_excludes_fainter_stars() -> None:
     scenes = [replace(ORION, mag_limit=limit) for limit in (3.0, 3.8, 6.0, None)]
     few, some, many, most = (len(star_pixels(scene, LENS, LONG)[0]) for scene in scenes)
     assert 5 < few < some < many < most
     assert light(replace(ORION, mag_limit=-5)).max() == 0
 
 
-def test_false_stars() -> None:
+def test_false_stars_add_light_and_repeat_with_the_seed() -> None:
     empty = replace(SkyScene.pointing(0.0, 0.0), mag_limit=-5, seed=4)
     one, five, again, other = (
         light(replace(empty, false_stars=number, seed=seed)).astype(float)
@@ -215,7 +215,7 @@ def test_false_stars() -> None:
     assert 5 * faintest < five.sum() < 5 * brightest
 
 
-def test_the_aperture_s_area_counts_and_vignetting_dims_the_corners() -> None:
+def test_light_scales_with_aperture_area_and_vignetting() -> None:
     scene = vega_at((30.0, 480.0), 0.0, (0, 0, 0))
     dimmed = light(scene, lens=replace(LENS, vignetting=4.0))
     wide = light(scene, lens=replace(LENS, aperture_mm=2 * LENS.aperture_mm))
@@ -244,7 +244,7 @@ def test_published_centroiding_error_of_18_noise_free_stars() -> None:
     assert np.all(np.mean(errors, axis=0) <= (0.0244, 0.0427))
 
 
-def test_the_glow_of_the_sky_fills_the_field_and_stars_shine_through_it() -> None:
+def test_sky_glow_adds_uniformly_to_the_stars() -> None:
     clear = Atmosphere(-1, 83.8, seeing_arcsec=0, scintillation=False, extinction_mag=0)
     dark = replace(ORION, atmosphere=clear)
     bright = replace(ORION, atmosphere=replace(clear, sky_mag=20.0))
@@ -278,7 +278,7 @@ def test_static_stars_do_not_streak() -> None:
     assert still.max() > 10 * light(replace(scene, mag_limit=0.1)).max()
 
 
-def test_image_edges_give_the_field_angles() -> None:
+def test_field_angles_are_those_of_the_image_edges() -> None:
     """Half a pixel beyond the outermost pixels' centres."""
     now = camera_state_for([0, 0, 0, 1], LENS)
     ends = {

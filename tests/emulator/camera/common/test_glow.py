@@ -27,7 +27,7 @@ def placed(name: str, optics: Optics, seed: int) -> SkyHazard:
 
 @pytest.mark.parametrize("optics", quick(LENSES, 1), ids=["cubestar", "aramis"])
 @pytest.mark.parametrize("name", GLOWING)
-def test_interpolation_is_as_good_as_each_pixel(name: str, optics: Optics) -> None:
+def test_interpolated_glow_matches_the_exact_value_per_pixel(name: str, optics: Optics) -> None:
     generator = np.random.default_rng(2)
     now = camera_state_for(ORION.quaternion, optics)
     for seed in range(3):
@@ -46,7 +46,7 @@ def test_interpolation_is_as_good_as_each_pixel(name: str, optics: Optics) -> No
         assert np.percentile(off, 98) < 0.05  # the rest is blurred, or at the limb
 
 
-def test_near_objects_hide_far_ones() -> None:
+def test_earth_hides_the_moon_but_not_glare() -> None:
     now = camera_state_for(ORION.quaternion, LENS)
     behind = Moon(direction=tuple(now.boresight.tolist()))
     earth = replace(placed("earth-limb", LENS, 0), nadir=behind.direction, airglow=0.0)
@@ -60,7 +60,7 @@ def test_near_objects_hide_far_ones() -> None:
     assert all_three[0] >= both[0]
 
 
-def test_even_glow_equals_the_sky_on_axis() -> None:
+def test_uniform_glow_equals_sky_brightness_on_axis() -> None:
     glare = SunGlare(direction=tuple(camera_state_for(ORION.quaternion, LENS).boresight.tolist()))
     even = replace(glare, slope_deg=1e6, transmittance=1e-12, decade_deg=180.0)
     scene = SkyScene(ORION.quaternion, mag_limit=-2, hazards=(even,))
@@ -85,7 +85,7 @@ def test_glow_smears_as_the_camera_turns() -> None:
 
 
 @pytest.mark.parametrize("sigma_px", [0.9, 3.0])
-def test_lens_blurs_the_edge_as_it_does_a_star(sigma_px: float) -> None:
+def test_lens_blurs_disc_edges_like_stars(sigma_px: float) -> None:
     optics = replace(LENS, psf_sigma_px=sigma_px)
     now = camera_state_for(ORION.quaternion, optics)
     moon = Moon(direction=tuple(now.boresight.tolist()), scatter=0.0)
@@ -98,7 +98,7 @@ def test_lens_blurs_the_edge_as_it_does_a_star(sigma_px: float) -> None:
     np.testing.assert_allclose(light[window], blurred, rtol=0, atol=0.005 * sharp.max())
 
 
-def test_without_hazards_nothing_glows() -> None:
+def test_no_glow_without_hazards() -> None:
     now = camera_state_for(ORION.quaternion, LENS)
     assert glow_electrons([], [now], LENS) is None
     assert glow_electrons([placed("aberration", LENS, 0)], [now], LENS) is None

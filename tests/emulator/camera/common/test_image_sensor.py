@@ -73,7 +73,7 @@ def test_rejected_scene_leaves_the_sensor_unchanged() -> None:
     assert (sensor.scene, sensor.condition) == ("sky", "bad")
 
 
-def test_supply_and_clock() -> None:
+def test_image_sensor_follows_supply_and_clock() -> None:
     sensor = Sensor("sky")
     assert sensor.running
     assert sensor.period * 3 == 10**6
@@ -104,7 +104,7 @@ def test_edges_stand_on_a_grid_that_does_not_drift() -> None:
 
 
 @given(hz=st.integers(1, 60_000_000), origin=st.integers(0, 10**15), time=st.integers(0, 10**16))
-def test_first_edge_is_the_first(hz: int, origin: int, time: int) -> None:
+def test_first_edge_is_the_earliest_at_or_after_a_time(hz: int, origin: int, time: int) -> None:
     clock = PixelClock(hz, origin)
     edge = clock.first_edge(time)
     assert clock.edge_ps(edge) >= time

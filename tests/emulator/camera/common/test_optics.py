@@ -30,17 +30,17 @@ def firmware_vectors(pixels: np.ndarray) -> np.ndarray:
     return u / np.linalg.norm(u, axis=1, keepdims=True)
 
 
-def test_default_lens_makes_the_firmwares_equations_exact() -> None:
+def test_default_lens_satisfies_the_firmware_equations_exactly() -> None:
     np.testing.assert_allclose(LENS.unproject(grid()), firmware_vectors(grid()), atol=1e-15)
 
 
 @pytest.mark.parametrize("distortion", Distortion)
-def test_there_and_back(distortion: Distortion) -> None:
+def test_unproject_and_project_are_inverse(distortion: Distortion) -> None:
     lens = replace(LENS, distortion=distortion)
     np.testing.assert_allclose(lens.project(lens.unproject(grid())), grid(), atol=1e-9)
 
 
-def test_inverse_against_a_general_solver() -> None:
+def test_lens_projection_equals_a_numerical_inverse() -> None:
     generator = np.random.default_rng(5)
     for pixel in generator.uniform([0, 0], [1023, 511], (20, 2)):
         vector = firmware_vectors(pixel[None])[0]
@@ -53,7 +53,7 @@ def test_inverse_against_a_general_solver() -> None:
         np.testing.assert_allclose(LENS.project(vector[None])[0], solved, atol=1e-8)
 
 
-def test_without_distortion_it_is_a_pinhole_of_the_published_field() -> None:
+def test_undistorted_lens_is_a_pinhole_with_the_published_field() -> None:
     lens = replace(LENS, k1=0, k2=0, p1=0, p2=0)
     angle = np.radians(10)
     pixels = lens.project(np.array([[np.sin(angle), 0, np.cos(angle)], [0, 0, 1]]))
@@ -65,7 +65,7 @@ def test_without_distortion_it_is_a_pinhole_of_the_published_field() -> None:
     assert np.degrees(np.arccos(top @ bottom)) == pytest.approx(25.7, abs=0.1)
 
 
-def test_toolbox_reading_against_the_toolboxs_own_formula() -> None:
+def test_toolbox_distortion_equals_the_toolbox_formula() -> None:
     # Camera Calibration Toolbox: x_d = (1 + kc1 r2 + kc2 r4) x + dx with kc as published.
     kc = (-0.32358, 0.12456, 0.00414, -0.00624)
     lens = replace(LENS, distortion=Distortion.TOOLBOX)
@@ -111,7 +111,7 @@ def test_direction_outside_the_field_does_not_hide_others() -> None:
 
 
 @pytest.mark.parametrize("stop_deg", [10.0, 40.0, 179.0, 180.0, 360.0])
-def test_a_light_shade_lets_a_round_field_through(stop_deg: float) -> None:
+def test_field_stop_transmits_a_circular_field(stop_deg: float) -> None:
     """Of 180 deg and more there is none."""
     angles = np.radians([0.0, stop_deg / 2 - 0.01, stop_deg / 2 + 0.01, 89.6])
     vectors = np.stack([np.sin(angles), 0 * angles, np.cos(angles)], axis=1)
@@ -121,7 +121,7 @@ def test_a_light_shade_lets_a_round_field_through(stop_deg: float) -> None:
 
 
 @pytest.mark.parametrize(("cx", "cy"), [(450, 200), (450, 300), (600, 200), (600, 300)])
-def test_half_the_field_is_the_way_to_the_farthest_corner(cx: float, cy: float) -> None:
+def test_half_field_is_the_angle_to_the_farthest_corner(cx: float, cy: float) -> None:
     """Corners of the outermost pixels, not their centres."""
     lens = replace(LENS, cx=cx, cy=cy)
     corner = (1023.5 if cx < 511.5 else -0.5, 511.5 if cy < 255.5 else -0.5)
@@ -129,7 +129,7 @@ def test_half_the_field_is_the_way_to_the_farthest_corner(cx: float, cy: float) 
     assert lens.half_field_deg == pytest.approx(np.degrees(np.arccos(vector[2])), abs=1e-9)
 
 
-def test_vignetting() -> None:
+def test_lens_vignetting_follows_the_cosine_power() -> None:
     vectors = np.array([[0, 0, 1.0], [np.sin(0.5), 0, np.cos(0.5)]])
     np.testing.assert_array_equal(LENS.transmission(vectors), [1, 1])
     natural = replace(LENS, vignetting=4)
@@ -143,7 +143,7 @@ def test_rejects_impossible_lenses(changes: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize(("cx", "cy"), [(24, 20), (24, 28), (40, 20), (40, 28)])
-def test_a_picture_may_fold_right_outside_of_the_outermost_pixel(cx: float, cy: float) -> None:
+def test_distortion_may_fold_back_just_outside_the_image(cx: float, cy: float) -> None:
     """r + k1 r^3 turns back where 3 k1 r^2 = -1; the farthest corner may be as near as that."""
     across, down = max(cx + 0.5, 63.5 - cx), max(cy + 0.5, 47.5 - cy)
     turn = -(LENS.fx**2) / (3 * (across**2 + down**2))
@@ -153,7 +153,7 @@ def test_a_picture_may_fold_right_outside_of_the_outermost_pixel(cx: float, cy: 
         replace(small, k1=1.01 * turn)
 
 
-def test_the_firmware_is_calibrated_to_the_lens() -> None:
+def test_default_firmware_calibration_matches_the_lens() -> None:
     commands = "FocalLength FocalLengthComponents PrincipalPoint RadialDistortionGains"
     reset = {
         field.name: field.reset
@@ -165,13 +165,13 @@ def test_the_firmware_is_calibrated_to_the_lens() -> None:
     assert reset == lens | {"FocalLength": LENS.focal_length_mm}
 
 
-def test_star_at_the_detection_limit() -> None:
+def test_star_at_the_detection_limit_has_the_expected_counts() -> None:
     electrons = LENS.electrons_per_second(3.8) * 0.3856
     assert electrons / ELECTRONS_PER_DN12 / DN12_PER_DN8 == pytest.approx(300, abs=1)
     assert 0.6 * 3000 < EFFECTIVE_WIDTH_A < 0.8 * 6000  # within the published factors
 
 
-def test_flux_against_equation_3_4_2() -> None:
+def test_star_flux_follows_equation_3_4_2() -> None:
     # Aperture in cm^2, times width, times 10^((15 - 2M)/5) photons: a hundred in five magnitudes.
     magnitudes = np.linspace(-1.4, 6, 12)
     expected = np.pi * 0.25**2 * EFFECTIVE_WIDTH_A * 10 ** ((15 - 2 * magnitudes) / 5)
@@ -190,14 +190,14 @@ RESIDUAL = Residual(SHAPE, ACROSS, DOWN)
 PIXELS = GENERATOR.uniform((0, 0), (1023, 511), (400, 2))
 
 
-def test_it_is_a_polynomial_over_the_sensor() -> None:
+def test_residual_is_a_polynomial_over_the_sensor() -> None:
     x, y = PIXELS[:, 0] / 511.5 - 1, PIXELS[:, 1] / 255.5 - 1
     down = np.array([row + (0.0,) * (5 - len(row)) for row in DOWN])
     expected = [polyval2d(x, y, np.array(ACROSS)), polyval2d(x, y, down)]
     np.testing.assert_allclose(RESIDUAL.at(PIXELS).T, expected, atol=1e-12)
 
 
-def test_corners_are_the_ends_of_the_scale_and_hold_beyond() -> None:
+def test_residual_grid_spans_the_corners_and_is_constant_beyond() -> None:
     tilt = Residual(SHAPE, ((0.0,), (1.0,)), ((0.0, 1.0),))
     corners = np.array([[0.0, 0.0], [1023.0, 0.0], [1023.0, 511.0], [511.5, 255.5]])
     expected = [[-1, -1], [1, -1], [1, 1], [0, 0]]
@@ -207,7 +207,7 @@ def test_corners_are_the_ends_of_the_scale_and_hold_beyond() -> None:
 
 
 @pytest.mark.parametrize("count", [0, 1, 2])
-def test_both_ways_undo_each_other(count: int) -> None:
+def test_displace_and_restore_are_inverse(count: int) -> None:
     residuals = (RESIDUAL, Residual(SHAPE, DOWN, ACROSS))[:count]
     seen = displace(PIXELS, residuals)
     np.testing.assert_allclose(restore(seen, residuals), PIXELS, atol=1e-10)
@@ -215,7 +215,7 @@ def test_both_ways_undo_each_other(count: int) -> None:
     assert bool(np.all(seen == PIXELS)) is (count == 0)
 
 
-def test_what_is_seen_is_displaced_by_what_holds_there() -> None:
+def test_displacement_uses_the_residual_at_the_displaced_pixel() -> None:
     seen = displace(PIXELS, (RESIDUAL,))
     np.testing.assert_allclose(seen - RESIDUAL.at(seen), PIXELS, atol=1e-10)
 

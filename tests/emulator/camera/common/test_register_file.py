@@ -28,7 +28,7 @@ def test_reset_values_can_be_read_in_order_and_the_pointer_wraps(registers: Regi
     assert registers.read() == 0  # address 0x00
 
 
-def test_register_at_once_and_register_with_sync(registers: RegisterFile) -> None:
+def test_register_takes_effect_at_once_or_at_sync(registers: RegisterFile) -> None:
     registers.select(0x10)
     assert [registers.write(b) for b in (0, 0xAB, 0xCD)] == [MODE, RATE, RATE]
     assert (registers.active("MODE"), registers.active("RATE")) == (0, 0x0203)
@@ -79,7 +79,7 @@ def test_logs_unmodelled_reads(registers: RegisterFile, caplog: pytest.LogCaptur
     ]
 
 
-def test_registers_of_sixteen_bits_behind_one_address() -> None:
+def test_sixteen_bit_registers_use_one_address() -> None:
     registers = RegisterFile(mt9m001.REGISTERS)
     registers.select(0x09)
     assert registers.read() == 0x0419

@@ -51,7 +51,7 @@ quaternion = [0, 0, 0, 2]
 """
 
 
-def test_sky_from_a_file(tmp_path: Path) -> None:
+def test_scene_file_loads_a_sky_scene(tmp_path: Path) -> None:
     view = load(save(tmp_path, SCENE))
     scene, condition = view.scene, view.condition
     np.testing.assert_allclose(scene.quaternion, quaternion_from_pointing(83.8, -5, 30))
@@ -68,7 +68,7 @@ def test_sky_from_a_file(tmp_path: Path) -> None:
     np.testing.assert_allclose(scene.truth(11 * 10**12), [0, 0, 0, 1])
 
 
-def test_shortest_files(tmp_path: Path) -> None:
+def test_minimal_scene_files_have_defaults(tmp_path: Path) -> None:
     view = load(save(tmp_path, 'kind = "sky"\nra_deg = 1\ndec_deg = 2'))
     assert view.scene.mag_limit is None
     assert view.condition == CONDITION
@@ -78,7 +78,7 @@ def test_shortest_files(tmp_path: Path) -> None:
     assert np.all(picture.pixels == 9)
 
 
-def test_picture_from_a_file(tmp_path: Path) -> None:
+def test_scene_file_loads_an_image_scene(tmp_path: Path) -> None:
     Image.new("L", (1100, 700), 9).save(tmp_path / "p.png")
     text = 'kind = "picture"\nfile = "p.png"\ncrop = [70, 180]\nexposure_ms = 5\n'
     view = load(save(tmp_path, text + "quaternion = [0, 2, 0, 0]\ntemperature_c = 3"))
@@ -147,7 +147,7 @@ def test_errors_are_one_line(tmp_path: Path, text: str, complaint: str) -> None:
     check_refused(load, tmp_path / "none.toml", "none.toml can not be read: No such file")
 
 
-def test_a_file_changes_the_device_s_lens_and_keeps_the_sensor(tmp_path: Path) -> None:
+def test_scene_file_changes_the_lens_but_not_the_sensor(tmp_path: Path) -> None:
     text = f"{SKY}[optics]\npsf_sigma_px = 2.5\n"
     for usual in (CONDITION, SkyCondition(double_gauss())):
         view = load_scene(save(tmp_path, text), usual)
@@ -156,7 +156,7 @@ def test_a_file_changes_the_device_s_lens_and_keeps_the_sensor(tmp_path: Path) -
         load(save(tmp_path, text + "columns = 5\n"))
 
 
-def test_a_night_on_the_ground(tmp_path: Path) -> None:
+def test_scene_file_sets_atmosphere_and_earth_rotation(tmp_path: Path) -> None:
     scene = load(save(tmp_path, NIGHT)).scene
     assert scene.atmosphere == Atmosphere(-33.9, 200, seeing_arcsec=3, sky_mag=19.5)
     np.testing.assert_allclose(scene.rate_deg_s, earth_rate_deg_s(scene.quaternion))
@@ -165,7 +165,7 @@ def test_a_night_on_the_ground(tmp_path: Path) -> None:
     assert dated.atmosphere.sidereal_deg == pytest.approx(209.4, abs=0.1)
 
 
-def test_a_pose_without_attitude_goes_on(tmp_path: Path) -> None:
+def test_pose_without_an_attitude_continues_from_the_previous_one(tmp_path: Path) -> None:
     turns = "".join(
         f"[[poses]]\nat_s = {start}\nrate_deg_s = {rate}\n"
         for start, rate in ((2, [0, 5, 0]), (4, [0, 0, 0]), (6, [0, 0, 1]))

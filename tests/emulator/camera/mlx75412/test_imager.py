@@ -42,7 +42,7 @@ def test_ideal_counts_are_the_upper_bits_of_12() -> None:
     np.testing.assert_array_equal(chip.ideal_counts(dn12), [*(np.arange(4096) >> 4), 0, 1, 1, 255])
 
 
-def test_dark_signal_is_published_at_65_degrees() -> None:
+def test_dark_signal_at_65_c_matches_the_published_value() -> None:
     assert chip.dark_dn12_per_second(65) == 1008
     assert chip.dark_dn12_per_second(57) == pytest.approx(504)
     # Uncorrected, at 65 C, 0.3 s: 302 counts of 12 bits.
@@ -50,7 +50,7 @@ def test_dark_signal_is_published_at_65_degrees() -> None:
     assert counts.mean() == pytest.approx(302 / 16 - 0.5, abs=0.2)
 
 
-def test_dark_rows_take_the_mean_away() -> None:
+def test_dark_rows_remove_the_mean_dark_signal() -> None:
     assert frame(flat(100 * BITS), temperature_c=65).mean() == pytest.approx(100 - 0.5, abs=0.1)
     dark = frame(flat(0), temperature_c=65)
     assert dark.mean() < 2.5  # only the positive half of the noise is left
@@ -68,7 +68,7 @@ def test_noise_is_poisson_plus_read_noise(level: float) -> None:
     assert np.var(first[inside] - second[inside]) / 2 == pytest.approx(expected, rel=0.02)
 
 
-def test_normal_noise_is_near_the_sum_of_poisson_and_normal() -> None:
+def test_normal_noise_approximates_poisson_plus_read_noise() -> None:
     # The worst case for the approximation is a mean of twice the squared read noise.
     mean = 2 * chip.READ_NOISE_ELECTRONS**2
     counts = frame(flat(mean), chip.Corrections(), exposure_s=0.0)
@@ -87,7 +87,7 @@ def test_dark_sky_is_nearly_black() -> None:
     assert np.sum(counts > 6) <= chip.FACTORY_HOT
 
 
-def test_fixed_pattern_and_its_correction() -> None:
+def test_fixed_pattern_noise_is_reduced_by_its_correction() -> None:
     def columns(corrections: chip.Corrections) -> float:
         frames = [frame(flat(100 * BITS), corrections, 0.0, seed=s) for s in range(4)]
         return float(np.mean(frames, axis=0).mean(axis=0).std())
@@ -97,7 +97,7 @@ def test_fixed_pattern_and_its_correction() -> None:
     assert columns(chip.Corrections()) < 0.2 * raw
 
 
-def test_defects_and_their_correction() -> None:
+def test_factory_defects_are_corrected_unless_raw() -> None:
     bright = flat(100 * BITS)
     raw, corrected = frame(bright, RAW, exposure_s=0.4), frame(bright, exposure_s=0.4)
     assert np.sum(raw < 20) == chip.FACTORY_DEAD
@@ -127,7 +127,7 @@ def test_seeds_repeat_a_sensor_and_a_frame() -> None:
     assert not np.any(first & second)
 
 
-def test_saturation_and_light_that_is_not_written_to() -> None:
+def test_sensor_saturates_and_leaves_its_input_unchanged() -> None:
     electrons = flat(5000 * chip.ELECTRONS_PER_DN12)
     before = electrons.copy()
     assert frame(electrons)[100:110].min() == 255
@@ -151,7 +151,7 @@ def test_noise_repeats_for_the_same_scene_and_frame_only() -> None:
     np.testing.assert_array_equal(imager.render(ORION, CONDITION, LONG, chip.Corrections()), first)
 
 
-def test_without_noise_only_light_is_left() -> None:
+def test_frame_without_noise_equals_the_ideal_counts() -> None:
     quiet = picture(ORION, condition=replace(CONDITION, noise=False, temperature_c=65))
     np.testing.assert_array_equal(quiet, chip.ideal_counts(star_light(ORION, LENS, LONG)))
     assert quiet.flags.c_contiguous
@@ -167,7 +167,7 @@ def test_hot_pixels_come_from_the_condition() -> None:
     ("lines", "programmed", "scale"),
     [(2917, 2917, 1.0), (100, 100, 1.0), (1000, 2000, 0.5), (2000, 1000, 2.0)],
 )
-def test_photograph_is_light_as_it_is_but_scales_in_the_undefined_frame(
+def test_photograph_scales_with_exposure_only_in_the_undefined_frame(
     striped: PictureScene, lines: int, programmed: int, scale: float
 ) -> None:
     shutter = replace(LONG, exposure_lines=lines, programmed_lines=programmed)

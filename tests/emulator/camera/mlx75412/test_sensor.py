@@ -56,7 +56,7 @@ def photographing(striped: PictureScene) -> Mlx75412:
     return made
 
 
-def test_only_its_own_address_is_acknowledged(camera: Mlx75412) -> None:
+def test_camera_acknowledges_only_its_own_address(camera: Mlx75412) -> None:
     assert not camera.i2c_write(0x2D, b"\x81\x00\x01", 0)
     assert camera.i2c_read(0x2D, 1, 0) is None
     assert not camera.enabled
@@ -72,7 +72,7 @@ def test_registers_are_read_back_with_auto_increment(camera: Mlx75412) -> None:
 
 
 @pytest.mark.parametrize("how", ["power", "reset"])
-def test_no_output_without_power_or_in_reset(camera: Mlx75412, how: str) -> None:
+def test_camera_has_no_output_without_power_or_in_reset(camera: Mlx75412, how: str) -> None:
     switch = camera.power if how == "power" else camera.set_reset_pin
     changes: list[int] = []
     camera.on_change = lambda: changes.append(1)
@@ -96,7 +96,7 @@ def test_pixel_clock_runs_while_disabled(camera: Mlx75412) -> None:
     assert (camera.line_clocks, camera.active_columns) == (1322, 1024)
 
 
-def test_sequence_after_enable(camera: Mlx75412) -> None:
+def test_mlx75412_frame_sequence_after_enable(camera: Mlx75412) -> None:
     now = 5 * MS + 12_345
     enable(camera, now)
     found = segments(camera, now, 6)
@@ -124,7 +124,7 @@ def test_longest_exposure_follows_the_frame_rate(camera: Mlx75412) -> None:
     assert [(s.exposure_lines, s.programmed_lines) for s in shutters] == [(2917, 2917)] * 2
 
 
-def test_values_wait_for_sync_and_for_the_next_frame(camera: Mlx75412) -> None:
+def test_register_values_wait_for_sync_and_the_next_frame(camera: Mlx75412) -> None:
     enable(camera, 0)
     first, blanking = segments(camera, 0, 2)
     write(camera, "EXPOSURE_RULE", 0, 10 * MS)
@@ -196,7 +196,7 @@ def test_rewriting_the_mode_has_no_effect(camera: Mlx75412) -> None:
         enable(camera, 1 * MS, on=False)
 
 
-def test_odd_crystal_keeps_its_grid() -> None:
+def test_camera_with_an_odd_crystal_keeps_its_clock_grid() -> None:
     camera = configured(crystal_hz=11_000_000)
     enable(camera, 1)
     assert camera.period == Fraction(10**12, 11 * 10**6)
@@ -243,7 +243,7 @@ def test_wait_yields_whole_frame(
     np.testing.assert_array_equal(stored(photographing, wait_ms * MS), striped.pixels)
 
 
-def test_frame_lookup(camera: Mlx75412) -> None:
+def test_frame_from_returns_the_first_readout_at_or_after_a_time(camera: Mlx75412) -> None:
     assert camera.frame_from(0) is None
     enable(camera, 10 * MS)
     segments(camera, 10 * MS, 5)
@@ -268,7 +268,7 @@ def test_pixels_are_rendered_on_demand_and_once(camera: Mlx75412) -> None:
     assert np.any(segment.pixels() != other)
 
 
-def test_features_reach_the_pixels() -> None:
+def test_camera_feature_register_affects_the_pixels() -> None:
     warm = replace(CONDITION, temperature_c=45)
     camera = configured(SkyScene([0, 0, 0, 1], mag_limit=-5), condition=warm, seed=1)
 
@@ -320,7 +320,7 @@ def test_view_sets_the_condition_and_scene_keeps_it() -> None:
         (6, 2.222, 2.224, 450),
     ],
 )
-def test_published_rates_and_exposures(
+def test_mlx75412_has_the_published_frame_rates_and_exposures(
     register: int, expected: float, measured: float, exposure_ms: int
 ) -> None:
     lines = frame_lines(27_000_000, register)
@@ -332,7 +332,7 @@ def test_published_rates_and_exposures(
     assert longest * chip.LINE_CLOCKS / 10_000 == pytest.approx(exposure_ms, abs=0.6)
 
 
-def test_frame_and_exposure_in_lines() -> None:
+def test_frame_and_exposure_lengths_in_lines_follow_the_registers() -> None:
     # The lowest rate is published, equation C.0.1: the input clock divided by 5 413 590.
     for slow in (0, 1, 4):
         assert frame_lines(27_000_000, slow) * chip.LINE_CLOCKS == 5_413_590

@@ -18,14 +18,14 @@ SHUTTER = RollingShutter(10**12, Fraction(31_750_000), 3000, 3000)
 
 
 @pytest.mark.parametrize("field_deg", [LIKELY_FIELD_DEG, PUBLISHED_FIELD_DEG])
-def test_the_picture_s_height_spans_the_field(field_deg: float) -> None:
+def test_image_height_spans_the_field_of_view(field_deg: float) -> None:
     lens = double_gauss(field_deg)
     middle = (lens.columns - 1) / 2
     top, bottom = lens.unproject(np.array([[middle, -0.5], [middle, 1023.5]]))
     assert np.degrees(np.arccos(top @ bottom)) == pytest.approx(field_deg)
 
 
-def test_the_shade_ends_the_field() -> None:
+def test_lens_shade_limits_the_field() -> None:
     angles = np.radians([0.0, 8.99, 9.01, 12.0])
     vectors = np.stack([np.sin(angles), np.zeros(4), np.cos(angles)], axis=1)
     for shade, light in ((True, [1, 1, 0, 0]), (False, [1, 1, 1, 1])):
@@ -38,7 +38,7 @@ def test_rejects_field_of_view_out_of_range(field_deg: float) -> None:
         double_gauss(field_deg)
 
 
-def test_light_has_the_sensor_s_size_and_falls_where_the_stars_are() -> None:
+def test_star_light_has_the_sensor_size_and_peaks_at_the_stars() -> None:
     light = star_light(ORION, LENS, SHUTTER)
     assert light.shape == (1024, 1280)
     hip, pixels = star_pixels(ORION, LENS, SHUTTER)
@@ -46,7 +46,7 @@ def test_light_has_the_sensor_s_size_and_falls_where_the_stars_are() -> None:
     assert light[y - 1 : y + 2, x - 1 : x + 2].max() == light.max()
 
 
-def test_the_shade_keeps_stars_beyond_the_field_away() -> None:
+def test_lens_shade_removes_stars_beyond_the_field() -> None:
     y, x = np.mgrid[:1024, :1280]
     outside = np.hypot(x - 639.5, y - 511.5) > 530
     assert star_light(ORION, double_gauss(shade=False), SHUTTER)[outside].sum() > 0

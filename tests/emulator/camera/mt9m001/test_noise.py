@@ -47,13 +47,13 @@ def electrons_sigma(picture: np.ndarray, gain: float = 1.0) -> float:
     return float(picture.std()) * LSB8 / gain
 
 
-def test_the_data_sheet_s_ratios_come_out() -> None:
+def test_noise_constants_reproduce_the_data_sheet_ratios() -> None:
     assert 20 * np.log10(np.sqrt(imager.FULL_WELL_ELECTRONS)) == pytest.approx(45)
     ratio = imager.FULL_WELL_ELECTRONS / imager.READ_NOISE_ELECTRONS
     assert 20 * np.log10(ratio) == pytest.approx(68.2)
 
 
-def test_without_noise_there_is_one_value() -> None:
+def test_frame_without_noise_is_uniform() -> None:
     picture = frame(10_000, imager.NoiseTerms.none())
     expected = 10_000 / LSB8 + imager.BLACK_LEVEL / 4
     assert np.unique(picture).tolist() == [int(expected + 0.5)]
@@ -67,12 +67,14 @@ def test_without_noise_there_is_one_value() -> None:
         ("readout", 2_000, 8.0, imager.READ_NOISE_ELECTRONS),
     ],
 )
-def test_one_term(term: str, light: float, gain: float, sigma: float) -> None:
+def test_each_noise_term_has_its_published_sigma(
+    term: str, light: float, gain: float, sigma: float
+) -> None:
     measured = electrons_sigma(frame(light, only(**{term: True}), gain), gain)
     assert measured == pytest.approx(np.hypot(sigma, quantisation_sigma(gain)), rel=0.02)
 
 
-def test_dark_current_doubles_and_leaves_its_noise_but_not_its_mean() -> None:
+def test_dark_current_adds_noise_but_no_mean_and_doubles_per_8_deg() -> None:
     assert imager.dark_electrons_per_s(33) / imager.dark_electrons_per_s(25) == pytest.approx(2)
     gain, warm = 8.0, 65.0
     dark = imager.dark_electrons_per_s(warm)
@@ -93,7 +95,7 @@ def test_background_adds_its_mean_and_its_noise() -> None:
     assert electrons_sigma(picture, gain) == pytest.approx(np.hypot(1_000**0.5, rounding), rel=0.03)
 
 
-def test_quantisation_follows_its_formula() -> None:
+def test_quantisation_noise_follows_its_formula() -> None:
     rng = np.random.default_rng(2)
     light = rng.uniform(5_000, 25_000, SHAPE).astype(np.float32)
 
@@ -108,7 +110,7 @@ def test_quantisation_follows_its_formula() -> None:
 
 
 @pytest.mark.parametrize(("quantisation", "least_of_one"), [(True, 3.5 / 4), (False, 0.5)])
-def test_the_wires_values_end_at_0_and_255(quantisation: bool, least_of_one: float) -> None:
+def test_pixel_values_are_clipped_to_0_and_255(quantisation: bool, least_of_one: float) -> None:
     """At this gain the noise of a dark pixel often goes below what is 1, of 8 bits."""
     gain = 15.0
     light = np.zeros(SHAPE)
@@ -119,7 +121,7 @@ def test_the_wires_values_end_at_0_and_255(quantisation: bool, least_of_one: flo
     assert (bright == 255).all()
 
 
-def test_the_terms_add_up_as_variances() -> None:
+def test_noise_terms_add_as_variances() -> None:
     light, gain, background = 800.0, 8.0, 15.0
     variance = light + imager.dark_electrons_per_s(20.0) + background
     variance += imager.READ_NOISE_ELECTRONS**2 + quantisation_sigma(gain) ** 2
@@ -127,7 +129,7 @@ def test_the_terms_add_up_as_variances() -> None:
     assert measured == pytest.approx(np.sqrt(variance), rel=0.02)
 
 
-def test_hot_pixels_shine_where_they_are_and_scale_with_the_dark_current() -> None:
+def test_hot_pixels_keep_their_places_and_scale_with_dark_current() -> None:
     places, shares = hot_pixels(7, 10, SHAPE[0] * SHAPE[1], imager.HOT_SHARE)
     picture = frame(0, only(dark=True), condition=replace(CONDITION, hot_pixels=10, seed=7))
     bright = set(np.flatnonzero(picture > 10).tolist())

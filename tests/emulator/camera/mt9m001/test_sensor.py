@@ -87,7 +87,9 @@ def test_default_frames_follow_the_data_sheet(camera: Mt9m001) -> None:
 @pytest.mark.parametrize(
     ("shutter", "rows"), [(100, 1050), (1049, 1050), (1050, 1051), (6299, 6300)]
 )
-def test_a_long_exposure_makes_the_frame_longer(camera: Mt9m001, shutter: int, rows: int) -> None:
+def test_exposure_longer_than_the_frame_lengthens_the_frame(
+    camera: Mt9m001, shutter: int, rows: int
+) -> None:
     put(camera, "SHUTTER_WIDTH", shutter)
     segments = stream(camera, 0, PS_PER_S)
     for (start, clocks, *_), (following, *_) in pairwise(segments):
@@ -131,7 +133,7 @@ def test_gain_applies_from_the_next_frame(camera: Mt9m001, clocks: int, counts: 
     assert bool(lines.pixels().max() > 200) is counts
 
 
-def test_changes_wait_while_they_are_held(camera: Mt9m001) -> None:
+def test_register_changes_wait_while_synchronised_changes_are_on(camera: Mt9m001) -> None:
     put(camera, "OUTPUT_CONTROL", 0b11)
     put(camera, "SHUTTER_WIDTH", 2000)
     put(camera, "GLOBAL_GAIN", 0x20)
@@ -140,7 +142,7 @@ def test_changes_wait_while_they_are_held(camera: Mt9m001) -> None:
     assert camera.frame_from(0).exposure_lines == 2000
 
 
-def test_registers_answer_as_declared(camera: Mt9m001) -> None:
+def test_camera_registers_have_reset_values_and_access_rights(camera: Mt9m001) -> None:
     for register in chip.REGISTERS:
         assert get(camera, register.name) == register.reset, register.name
     put(camera, "GLOBAL_GAIN", 0x51)
@@ -159,7 +161,7 @@ def test_registers_answer_as_declared(camera: Mt9m001) -> None:
     assert camera.enabled
 
 
-def test_consecutive_registers_half_words_and_strangers(camera: Mt9m001) -> None:
+def test_camera_i2c_supports_bursts_and_half_words_and_ignores_others(camera: Mt9m001) -> None:
     put(camera, "ROW_START", 20, 40, 255, 639)
     names = ("ROW_START", "COLUMN_START", "ROW_SIZE", "COLUMN_SIZE")
     assert [get(camera, name) for name in names] == [20, 40, 255, 639]
@@ -170,7 +172,7 @@ def test_consecutive_registers_half_words_and_strangers(camera: Mt9m001) -> None
     assert camera.i2c_read(0x2C, 2, 0) is None
 
 
-def test_no_answer_and_no_clock_without_power_or_in_reset(camera: Mt9m001) -> None:
+def test_camera_is_silent_without_power_or_in_reset(camera: Mt9m001) -> None:
     put(camera, "SHUTTER_WIDTH", 77)
     for switch in (camera.power, camera.set_reset_pin):
         switch(False, 10)
@@ -197,7 +199,7 @@ def test_stop_ends_the_frame_and_start_begins_an_exposure(camera: Mt9m001) -> No
     assert first == pytest.approx(250 * PS_PER_MS + exposed_ps, rel=1e-6)
 
 
-def test_a_window_is_a_part_of_the_picture() -> None:
+def test_windowed_frame_equals_that_part_of_the_full_frame() -> None:
     def taken(shutter: int, *window: int) -> np.ndarray:
         made = Mt9m001(SkyView(scene(), QUIET))
         put(made, "ROW_START", *window)
@@ -213,7 +215,7 @@ def test_a_window_is_a_part_of_the_picture() -> None:
     assert (picture[:10] == 1).all()
 
 
-def test_gain_multiplies_and_can_differ_by_rows_and_columns() -> None:
+def test_gain_scales_pixels_and_can_differ_by_row_and_column() -> None:
     camera = Mt9m001(scene(mag_limit=-5.0), condition=QUIET)
     assert np.unique(frame(camera, 0)).tolist() == [2]  # the black level, rounded
     bright = Mt9m001(scene(), condition=replace(QUIET, optics=double_gauss(spot_sigma_px=4)))
@@ -248,7 +250,7 @@ def test_rejects_foreign_lens_and_scene_without_sky() -> None:
     assert camera.condition is CONDITION
 
 
-def test_a_turning_camera_smears_along_its_motion() -> None:
+def test_rotating_camera_smears_stars_along_its_motion() -> None:
     """At 10 deg/s across, 10 ms of exposure draw 4.7 px."""
     turning = scene(rate_deg_s=(0.0, 10.0, 0.0), mag_limit=4.5)
 
@@ -274,7 +276,7 @@ def test_a_turning_camera_smears_along_its_motion() -> None:
     assert wide - high == pytest.approx(streak_px**2 / 12, rel=0.2)
 
 
-def test_a_window_s_rows_have_their_own_times() -> None:
+def test_rows_of_a_window_have_their_own_exposure_times() -> None:
     turning = scene(rate_deg_s=(0.0, 5.0, 0.0), mag_limit=5.0)
     whole = replace(read_settings(RegisterFile(chip.REGISTERS)), gains=(4.0, 4.0, 4.0, 4.0))
     first_ps, line_ps = 2 * 10**11, Fraction(31_750_000)

@@ -24,26 +24,26 @@ def towards(theta_deg: float, phi_deg: float) -> np.ndarray:
     return Rotation.from_rotvec(np.radians(theta_deg) * axis).apply([0, 0, 1])
 
 
-def test_published_radii() -> None:
+def test_fisheye_distortion_matches_the_published_radii() -> None:
     assert fisheye.distort(182.0) == pytest.approx(168, abs=0.5)  # of the test ball
     assert fisheye.undistort(168.0) == pytest.approx(182, abs=0.5)
     assert fisheye.distort(2.9 * 95) == pytest.approx(226, abs=0.7)  # of the rim
     np.testing.assert_array_equal(fisheye.undistort([0.0, 0.05, 0.1]), 0)
 
 
-def test_the_firmware_knows_the_lens_and_the_picture() -> None:
+def test_firmware_and_emulator_share_lens_scale_and_camera_numbers() -> None:
     assert codes.PIXELS_PER_DEGREE == fisheye.PIXELS_PER_DEGREE
     assert [(c.name, int(c)) for c in codes.Camera] == [(t.name, int(t)) for t in CameraTarget]
 
 
 @pytest.mark.parametrize("radius", [0.2, 1.0, 50.0, 168.0, 226.0])
-def test_undistorting_finds_the_root_of_the_cubic(radius: float) -> None:
+def test_undistort_finds_the_root_of_the_cubic(radius: float) -> None:
     roots = np.roots([-2.5572e-6, 7.6076e-5, 0.9953, 0.1036 - radius])
     inside = [r.real for r in roots if abs(r.imag) < 1e-9 and 0 <= r.real < 276]
     assert inside == [pytest.approx(float(fisheye.undistort(radius)), abs=1e-9)]
 
 
-def test_angles_are_a_turn_away_from_the_boresight() -> None:
+def test_alpha_beta_angles_are_a_rotation_from_the_boresight() -> None:
     for theta in (0.0, 10.0, 90.0, 95.0, 170.0):
         for phi in (-170.0, -45.0, 0.0, 90.0, 135.0):
             alpha, beta = theta * np.cos(np.radians(phi)), theta * np.sin(np.radians(phi))
@@ -55,7 +55,9 @@ def test_angles_are_a_turn_away_from_the_boresight() -> None:
 @pytest.mark.parametrize(
     ("camera", "centre"), [(CameraTarget.SUN, (369, 250)), (CameraTarget.NADIR, (371, 236))]
 )
-def test_published_boresights_and_axes(camera: CameraTarget, centre: tuple[float, float]) -> None:
+def test_fisheye_lenses_have_the_published_boresights_and_axes(
+    camera: CameraTarget, centre: tuple[float, float]
+) -> None:
     lens, (cx, cy) = fisheye.LENSES[camera], centre
     np.testing.assert_array_equal(lens.project([0, 0, 2.0]), centre)
     np.testing.assert_array_equal(lens.unproject([centre]), [[0, 0, 1]])
@@ -64,7 +66,7 @@ def test_published_boresights_and_axes(camera: CameraTarget, centre: tuple[float
     np.testing.assert_allclose(down, (cx, cy + fisheye.distort(29.0)))
 
 
-def test_projecting_is_undone_within_the_field() -> None:
+def test_unproject_inverts_project_within_the_field() -> None:
     lens = fisheye.LENSES[CameraTarget.SUN]
     generator = np.random.default_rng(5)
     for theta, phi in generator.uniform([0, -180], [fisheye.FIELD_DEG, 180], (200, 2)):
@@ -75,7 +77,7 @@ def test_projecting_is_undone_within_the_field() -> None:
 
 
 @pytest.mark.parametrize("camera", list(CameraTarget))
-def test_field_of_view(camera: CameraTarget) -> None:
+def test_lens_field_covers_the_lit_pixels(camera: CameraTarget) -> None:
     lens = fisheye.LENSES[camera]
     field = lens.field
     y, x = np.divmod(field.index, 640)
@@ -94,7 +96,7 @@ def test_field_of_view(camera: CameraTarget) -> None:
         assert field.lit.sum() == pytest.approx(np.pi * 226.61**2, rel=1e-4)
 
 
-def test_pixel_angle_is_that_between_neighbours() -> None:
+def test_pixel_solid_angle_is_that_between_its_corners() -> None:
     lens = fisheye.LENSES[CameraTarget.NADIR]
     field = lens.field
     for x, y in [(380, 240), (471, 336), (371, 36), (160, 236)]:
@@ -105,7 +107,7 @@ def test_pixel_angle_is_that_between_neighbours() -> None:
         assert field.pixel_rad[at] == pytest.approx(np.sqrt(area), rel=0.02)
 
 
-def test_pixels_on_the_rim_are_lit_by_their_share_of_it() -> None:
+def test_rim_pixels_are_lit_by_their_share_of_the_field() -> None:
     lens = fisheye.LENSES[CameraTarget.NADIR]
     rim = float(fisheye.distort(2.9 * 95))
     fine = (np.arange(10) - 4.5) / 10
@@ -126,7 +128,7 @@ def polar(theta: float, phi: float) -> np.ndarray:
     return theta * np.array([np.cos(phi), np.sin(phi)])
 
 
-def test_a_radial_error_is_that_of_its_nodes_and_none_on_axis_and_rim() -> None:
+def test_radial_lens_error_matches_its_nodes_and_vanishes_on_axis_and_rim() -> None:
     lens = LensError(radial_deg=LENS.radial_deg)
     for theta, error in [(0, 0), *LENS.radial_deg, (FIELD_DEG, 0)]:
         for phi in (0.0, 1.0, 4.0):
@@ -139,7 +141,7 @@ def test_a_radial_error_is_that_of_its_nodes_and_none_on_axis_and_rim() -> None:
         np.testing.assert_allclose(even.displace(polar(theta, 0)), (theta + 0.5, 0), atol=1e-12)
 
 
-def test_decentring_is_brown_s_near_the_axis_and_none_at_the_rim() -> None:
+def test_decentring_follows_brown_near_the_axis_and_vanishes_at_the_rim() -> None:
     p1, p2 = 0.3, -0.2
     x, y = 0.02, 0.05
     moved = LensError(decentring_deg=(p1, p2)).displace(np.array([x, y]) * FIELD_DEG)
@@ -151,7 +153,7 @@ def test_decentring_is_brown_s_near_the_axis_and_none_at_the_rim() -> None:
     np.testing.assert_allclose(LENS.displace(rim), rim, atol=1e-12)
 
 
-def test_projecting_is_undone_and_shifted_by_the_error() -> None:
+def test_unproject_inverts_project_with_a_lens_error() -> None:
     lens, nominal = lens_of(CameraTarget.SUN, LENS), LENSES[CameraTarget.SUN]
     generator = np.random.default_rng(3)
     for theta, phi in generator.uniform([0.5, -3], [FIELD_DEG, 3], (100, 2)):
@@ -163,7 +165,7 @@ def test_projecting_is_undone_and_shifted_by_the_error() -> None:
     assert lens.project(vector_from_angles(95.01, 0)) is None
 
 
-def test_the_rim_stays_where_it_is_published() -> None:
+def test_lens_error_keeps_the_published_rim() -> None:
     lens, nominal = (
         lens_of(CameraTarget.NADIR, LensError(LENS.centre_px)),
         LENSES[CameraTarget.NADIR],
@@ -188,7 +190,7 @@ def test_rejects_impossible_lens(wrong: dict[str, tuple[float, ...]]) -> None:
         LensError(**wrong)
 
 
-def test_units_have_lenses_of_their_own() -> None:
+def test_each_unit_has_its_own_lens_errors() -> None:
     drawn = [draw_lens(camera, serial) for camera in CameraTarget for serial in SERIALS]
     assert len(set(drawn)) == len(drawn)
     assert draw_lens(CameraTarget.NADIR, 7) == draw_lens(CameraTarget.NADIR, 7) != NOMINAL
@@ -197,7 +199,7 @@ def test_units_have_lenses_of_their_own() -> None:
     assert np.abs(centres.mean(axis=0)).max() < 0.1
 
 
-def test_the_sun_s_lenses_err_outwards_by_up_to_what_is_published() -> None:
+def test_sun_lens_errors_are_outward_within_the_published_maximum() -> None:
     for serial in SERIALS:
         radial = draw_lens(CameraTarget.SUN, serial).radial_deg
         for (angle, error), (expected, most) in zip(radial, SUN_OFFSETS_DEG, strict=True):

@@ -52,13 +52,13 @@ def centroid(image: np.ndarray) -> np.ndarray:
     return np.array([x.mean(), y.mean()])
 
 
-def test_without_hazards_the_lens_is_the_unit_s_own() -> None:
+def test_lens_is_unchanged_without_lens_hazards() -> None:
     assert camera().lens is NOMINAL
     assert camera(Gradient(), Defocus(sigma_px=3.0)).lens is NOMINAL
 
 
 @pytest.mark.parametrize("name", sorted(HAZARDS.keys() - {"dose"}))
-def test_worst_strength_is_visible_and_repeatable(name: str) -> None:
+def test_worst_strength_is_visible_and_repeatable_in_the_ov7620(name: str) -> None:
     hazard = HAZARDS[name]
     worst = hazard.sample(hazard.strength.values[-1], None, np.random.default_rng(1))
     one = grey(worst)
@@ -66,26 +66,26 @@ def test_worst_strength_is_visible_and_repeatable(name: str) -> None:
     assert np.mean(one != grey()) > 1e-3
 
 
-def test_damage_is_too_little_for_half_a_millisecond() -> None:
+def test_dose_effect_is_at_most_1_count_in_a_short_exposure() -> None:
     # 10 krad: 0.7 sources in each hundred pixels, of 4500 electrons a second; 433 a grey value.
     hazard = HAZARDS["dose"].sample(10, None, np.random.default_rng(1))
     assert np.abs(grey(hazard) - grey()).max() <= 1
 
 
 @pytest.mark.parametrize("gain", [0, 0x1F])
-def test_a_gradient_ends_at_its_counts_whatever_the_gain(gain: int) -> None:
+def test_gradient_maximum_does_not_depend_on_the_gain(gain: int) -> None:
     added = grey(Gradient(counts=60.0, seed=1), scene=DARK, gain=gain) - 34
     assert added.min() <= 1
     assert added.max() == pytest.approx(60, abs=1)
 
 
-def test_a_background_has_its_level_and_its_noise() -> None:
+def test_background_adds_its_mean_and_noise_in_the_ov7620() -> None:
     added = grey(Background(counts=20.0, sigma=4.0), scene=DARK, noise=True) - 34
     assert added.mean() == pytest.approx(20, abs=0.1)
     assert added.std() == pytest.approx(np.hypot(4, 0.8), rel=0.03)
 
 
-def test_protons_leave_other_tracks_in_each_frame_and_camera() -> None:
+def test_proton_tracks_differ_between_frames_and_cameras() -> None:
     hit = Protons(hits=100)
     shots = [grey(hit, scene=DARK, frame=frame, which=w) for frame in (3, 4) for w in CameraTarget]
     places = [set(np.flatnonzero(shot > 40).tolist()) for shot in shots]
@@ -95,14 +95,14 @@ def test_protons_leave_other_tracks_in_each_frame_and_camera() -> None:
             assert len(one & other) < 0.2 * len(one)
 
 
-def test_hot_pixels_are_stuck_as_those_of_the_key() -> None:
+def test_hot_pixel_hazard_adds_to_the_condition_key() -> None:
     stuck = grey(HotPixels(count=50), scene=DARK, hot_pixels=9)
     np.testing.assert_array_equal(stuck, grey(scene=DARK, hot_pixels=59))
     with pytest.raises(SceneError, match="hot_pixels and hot_pairs must be at most 76800 together"):
         FisheyeCondition(hazards=(HotPixels(count=75_000),), hot_pairs=1801)
 
 
-def test_each_camera_has_a_draw_of_its_own() -> None:
+def test_hazards_are_drawn_independently_per_camera() -> None:
     slopes = [grey(Gradient(seed=6), scene=DARK, which=which) for which in CameraTarget]
     assert np.abs(slopes[0] - slopes[1]).max() > 5
     sun, nadir = (camera(LensResiduals(seed=6), which=which).lens for which in CameraTarget)
@@ -119,7 +119,7 @@ def test_a_longer_lens_moves_the_sun_away_from_the_boresight() -> None:
     np.testing.assert_allclose(moved, 1.03 * own, atol=0.1)
 
 
-def test_a_longer_lens_has_a_longer_rim() -> None:
+def test_longer_focal_length_enlarges_the_lit_field() -> None:
     lens = camera(FocalLength(percent=3.0)).lens
     lit = [np.count_nonzero(lens_of(CameraTarget.NADIR, own).field.lit) for own in (NOMINAL, lens)]
     # All but what is cut off at the top and bottom edge.
@@ -139,7 +139,7 @@ def test_residuals_displace_and_can_be_undone() -> None:
 
 
 @pytest.mark.parametrize("sigma", [0.5, 3.0])
-def test_defocus_spreads_the_light_and_loses_none(sigma: float) -> None:
+def test_defocus_conserves_light(sigma: float) -> None:
     light = np.zeros((60, 80), np.float32)
     light[30, 40], light[31, 45] = 1000, 500
     soft = blur(light, sigma)

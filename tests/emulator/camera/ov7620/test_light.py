@@ -58,7 +58,7 @@ def test_limb_is_63_48_deg_from_the_nadir_all_around() -> None:
     assert angles.mean() == pytest.approx(63.48, abs=0.02)
 
 
-def test_nothing_is_beyond_the_rim() -> None:
+def test_pixels_beyond_the_lens_rim_are_black() -> None:
     picture = levels(noon(EarthSunScene.facing(nadir_deg=(70, 0))), NADIR)
     assert np.all(picture[radius(NADIR) > 227.2] == 34)
     assert np.all(picture[(radius(NADIR) < 226) & (ROWS == 236) & (COLUMNS > 400)] > 100)
@@ -70,7 +70,7 @@ def test_nothing_is_beyond_the_rim() -> None:
     assert part == pytest.approx(share * whole, rel=0.05)
 
 
-def test_night_side_is_dark_and_the_terminator_divides_the_picture() -> None:
+def test_night_side_is_dark_and_the_terminator_divides_the_image() -> None:
     assert levels(EarthSunScene(sun=(0, 0, 1)), NADIR).max() < 34.5
     picture = levels(EarthSunScene(sun=(1, 0, 0), sun_camera=DOWN, unevenness=0), NADIR)
     row = picture[236]
@@ -90,7 +90,7 @@ def test_sun_has_the_requested_size_on_the_boresight(bloom_px: float) -> None:
     assert picture[0, 0] == 34
 
 
-def test_sun_is_where_its_direction_says() -> None:
+def test_sun_image_lies_in_its_direction() -> None:
     generator = np.random.default_rng(2)
     for alpha, beta in generator.uniform(-60, 60, (20, 2)):
         light = levels(EarthSunScene.facing((alpha, beta)), SUN) - 34
@@ -100,7 +100,7 @@ def test_sun_is_where_its_direction_says() -> None:
         np.testing.assert_allclose(offset / np.hypot(*offset) * theta, [alpha, beta], atol=0.01)
 
 
-def test_sun_shrinks_as_published_towards_the_rim_and_is_cut_there() -> None:
+def test_sun_image_shrinks_towards_the_rim_and_is_cut_by_the_sensor() -> None:
     size, _ = bright(levels(EarthSunScene.facing((90, 0)), SUN, 8.0))
     assert size == pytest.approx(6, abs=0.3)
     # 94 deg down is below the sensor's last row: the sun camera's field is cut there.
@@ -132,7 +132,7 @@ def test_moon_is_small_and_has_phases() -> None:
     np.testing.assert_array_equal(levels(hidden, NADIR), levels(replace(hidden, moon=None), NADIR))
 
 
-def test_reflection_is_an_even_disc_in_its_own_camera() -> None:
+def test_reflection_is_a_uniform_disc_in_its_own_camera() -> None:
     ghost = Reflection(SUN, 20, -30, radius_px=6, level=180)
     scene = EarthSunScene.facing((40, 40), reflections=(ghost,))
     plain = replace(scene, reflections=())
@@ -144,7 +144,7 @@ def test_reflection_is_an_even_disc_in_its_own_camera() -> None:
     np.testing.assert_array_equal(levels(scene, NADIR), levels(plain, NADIR))
 
 
-def test_a_glow_is_as_bright_as_it_is_by_the_earth() -> None:
+def test_glint_brightness_follows_the_transmission_of_each_camera() -> None:
     """A patch of the radiance 1, in both cameras: published transmission 1e-4."""
     glint = Glint(surface=EARTH_RADIANCE / SUN_SURFACE, count=1, seed=4)
     dark = EarthSunScene(nadir=(0, 1, 0), sun=(0, 1, 0.1), hazards=(glint,))
@@ -155,7 +155,7 @@ def test_a_glow_is_as_bright_as_it_is_by_the_earth() -> None:
     assert 90 < (levels(mirror, SUN) - 34).max() < 461
 
 
-def test_the_earth_hides_what_is_behind_it_and_not_what_is_in_the_lens() -> None:
+def test_earth_hides_bodies_behind_it_but_not_lens_reflections() -> None:
     behind = EarthSunScene(hazards=(Moon(direction=(0.0, 0.0, 1.0)),))
     plain = levels(replace(behind, hazards=()), NADIR)
     assert np.abs(levels(behind, NADIR) - plain).max() < 0.5  # what the lens would scatter
@@ -174,7 +174,7 @@ def test_hazard_uses_the_scene_s_sun_by_default() -> None:
     np.testing.assert_array_equal(dark, levels(night, NADIR))
 
 
-def test_picture_is_that_of_its_instant() -> None:
+def test_image_shows_the_scene_at_its_time() -> None:
     scene = EarthSunScene(rate_deg_s=(0, 1.0, 0), unevenness=0)
     later = scene_light(scene, NADIR, 7.0, 10 * 10**12)
     expected = EarthSunScene.facing(nadir_deg=(-10, 0), unevenness=0)
@@ -188,7 +188,7 @@ def flat(level: float) -> np.ndarray:
     return np.full((480, 640), level, np.float32)
 
 
-def test_ideal_levels() -> None:
+def test_luminance_has_black_level_34_and_saturates() -> None:
     steps = flat(0)
     steps[0, :6] = [0.4, 0.6, 119, 220.4, 221, 1e6]
     grey = luminance(steps, 1.0, None, NONE)
@@ -224,7 +224,7 @@ def test_stuck_pixels_are_at_full_scale_and_each_camera_has_its_own() -> None:
         assert np.any(stuck != other)
 
 
-def test_pairs_are_side_by_side_and_never_three() -> None:
+def test_stuck_pixel_pairs_are_adjacent_and_never_triples() -> None:
     for seed in range(20):
         hot = np.zeros(480 * 640, bool)
         hot[stuck_pixels(seed, CameraTarget.NADIR, 300, 200)] = True

@@ -26,34 +26,36 @@ def device() -> Device:
     return Device()
 
 
-def test_three_bytes_write_a_register(device: Device) -> None:
+def test_sccb_three_byte_message_writes_a_register(device: Device) -> None:
     expected = [(a, v) for a, v in np.random.default_rng(6).integers(0, 256, (50, 2)).tolist()]
     for address, value in expected:
         assert device.send(bytes([0x42, address, value])) == [0, 0, 0]
     assert device.registers == expected
 
 
-def test_value_counts_with_the_ninth_clock_of_the_third_byte(device: Device) -> None:
+def test_sccb_value_takes_effect_at_the_ninth_clock_of_its_byte(device: Device) -> None:
     device.send(bytes([0x42, 0x10, 0x5A]), step_ps=10 * US)
     # 4 steps of the start, 2 bytes of 27 steps, 8 bits of 3 steps, SDA released, SCL up.
     assert device.written[0][2] == (4 + 2 * 27 + 24 + 2) * 10 * US
 
 
 @pytest.mark.parametrize("address", [0x40, 0x43, 0x00, 0xFF])
-def test_ignores_other_addresses_and_reads(device: Device, address: int) -> None:
+def test_sccb_camera_ignores_other_addresses_and_reads(device: Device, address: int) -> None:
     assert device.send(bytes([address, 0x10, 0x5A])) == [1, 1, 1]
     assert device.registers == []
     device.send(bytes([0x42, 0x10, 0x5A]))
     assert device.registers == [(0x10, 0x5A)]
 
 
-def test_short_transmissions_write_nothing(device: Device) -> None:
+def test_short_sccb_transmissions_write_nothing(device: Device) -> None:
     for data in (b"", b"\x42", b"\x42\x10"):
         assert device.send(data) == [0] * len(data)
     assert device.registers == []
 
 
-def test_extra_bytes_are_logged_only(device: Device, caplog: pytest.LogCaptureFixture) -> None:
+def test_extra_sccb_bytes_are_logged_and_ignored(
+    device: Device, caplog: pytest.LogCaptureFixture
+) -> None:
     device.send(bytes([0x42, 0x10, 0x5A, 0x77]))
     assert device.registers == [(0x10, 0x5A)]
     assert caplog.messages == ["SCCB: ignored byte 0x77 after a register's value"]
@@ -107,7 +109,7 @@ def test_too_fast_clock_is_logged_once(device: Device, caplog: pytest.LogCapture
         (1_300_000, 599_999, ["high was 0.60, right 0.6"]),
     ],
 )
-def test_the_shortest_times_are_those_of_the_data_sheet(
+def test_sccb_reports_times_shorter_than_the_data_sheet_allows(
     device: Device, caplog: pytest.LogCaptureFixture, low_ps: int, high_ps: int, told: list[str]
 ) -> None:
     """I2C's fast mode: SCL low for 1.3 us, high for 0.6 us."""
@@ -120,6 +122,6 @@ def test_the_shortest_times_are_those_of_the_data_sheet(
     assert [f"{a} was {b:.2f}, right {c:.1f}" for a, b, c in heard] == told
 
 
-def test_there_are_only_two_pins(device: Device) -> None:
+def test_sccb_slave_rejects_unknown_pins(device: Device) -> None:
     with pytest.raises(ValueError, match="has the pins SCL and SDA, not 'CLK'"):
         device.slave.on_pin("CLK", 1, 0)

@@ -40,7 +40,7 @@ level = 200
 """
 
 
-def test_scene_from_a_file(tmp_path: Path) -> None:
+def test_scene_file_loads_an_earth_sun_scene(tmp_path: Path) -> None:
     view = load_earth_sun_scene(save(tmp_path, SCENE))
     scene = view.scene
     truth = scene.truth(NADIR, 0)
@@ -61,14 +61,14 @@ def test_example_in_the_documentation_is_a_scene(tmp_path: Path) -> None:
     assert scene.truth(NADIR, 0).visible
 
 
-def test_a_lens_from_a_file(tmp_path: Path) -> None:
+def test_scene_file_sets_the_lens_and_rejects_invalid_values(tmp_path: Path) -> None:
     text = f"{LENS}centre_px = [1, -2]\nradial_deg = [[40, 0.5], [60.0, 1]]"
     condition = load_earth_sun_scene(save(tmp_path, text)).condition
     assert condition.sun_lens == LensError((1.0, -2.0), ((40.0, 0.5), (60.0, 1.0)))
     assert condition.nadir_lens is None
 
 
-def test_shortest_file(tmp_path: Path) -> None:
+def test_minimal_earth_sun_scene_file_has_defaults(tmp_path: Path) -> None:
     view = load_earth_sun_scene(save(tmp_path, 'kind = "earth-sun"'))
     assert view.scene.altitude_km == 750
     assert view.scene.moon is None
@@ -108,7 +108,7 @@ def test_errors_are_one_line(tmp_path: Path, text: str, complaint: str) -> None:
     check_refused(load_earth_sun_scene, save(tmp_path, text), complaint)
 
 
-def test_the_ball_of_the_bench(tmp_path: Path) -> None:
+def test_scene_file_loads_the_test_ball(tmp_path: Path) -> None:
     text = f"{BALL}angle_deg = [20, -10]\nseed = 4\nnoise = false\n[nadir_lens]\n"
     view = load_earth_sun_scene(save(tmp_path, text + "centre_px = [1, 0]"))
     truth = view.scene.truth(CameraTarget.NADIR, 0)

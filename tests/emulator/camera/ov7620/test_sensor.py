@@ -57,7 +57,7 @@ def camera(scene: EarthSunScene) -> Ov7620:
     return make(scene)
 
 
-def test_published_frame_timing(camera: Ov7620) -> None:
+def test_ov7620_frame_timing_matches_the_published_one(camera: Ov7620) -> None:
     assert float(camera.period) == pytest.approx(74_074, abs=0.1)  # "74 ns"
     assert (camera.line_clocks, camera.active_columns) == (858, 640)
     found = segments(camera, 0, 9)
@@ -85,7 +85,7 @@ def test_segment_at_any_time_contains_it(camera: Ov7620) -> None:
         assert segment.start_ps <= time_ps < end or segment.start_ps == time_ps + 1
 
 
-def test_usual_exposure_gives_the_published_levels(scene: EarthSunScene) -> None:
+def test_default_exposure_yields_the_published_grey_levels(scene: EarthSunScene) -> None:
     grey = picture(make(replace(scene, unevenness=0)))
     assert (grey.shape, grey.dtype) == ((480, 640), np.uint8)
     assert grey.flags.c_contiguous
@@ -116,7 +116,7 @@ def test_values_wait_for_the_next_frame_and_exposure_one_longer(camera: Ov7620) 
     assert [frame.exposure_lines for frame in frames] == [8, 8, 4]
 
 
-def test_changes_are_announced_to_observers_that_looked_ahead(camera: Ov7620) -> None:
+def test_register_change_is_announced_only_if_it_affects_announced_frames(camera: Ov7620) -> None:
     changes: list[int] = []
     camera.on_change = lambda: changes.append(1)
     camera.segment_at(5 * MS)
@@ -127,7 +127,7 @@ def test_changes_are_announced_to_observers_that_looked_ahead(camera: Ov7620) ->
     assert changes == [1]
 
 
-def test_window(scene: EarthSunScene) -> None:
+def test_camera_window_registers_crop_the_frame(scene: EarthSunScene) -> None:
     whole = picture(make(scene))
     across = {"HSTART": window_column(200), "HSTOP": window_column(520)}
     camera = make(scene, **across, VSTART=window_row(100), VSTOP=window_row(340))
@@ -147,7 +147,7 @@ def test_window(scene: EarthSunScene) -> None:
         ({"HSTOP": 0, "VSTOP": 0}, (2, 4)),
     ],
 )
-def test_window_is_kept_within_the_picture(
+def test_camera_window_is_kept_within_the_image(
     scene: EarthSunScene, values: dict[str, int], shape: tuple[int, int]
 ) -> None:
     camera = make(scene, **values)
@@ -155,7 +155,7 @@ def test_window_is_kept_within_the_picture(
     assert lines.pixels().shape == shape == (lines.rows, camera.active_columns)
 
 
-def test_mirror(scene: EarthSunScene) -> None:
+def test_mirror_bit_mirrors_the_image(scene: EarthSunScene) -> None:
     mirrored = picture(make(scene, COMMON_A=0x40))
     assert mirrored.flags.c_contiguous
     np.testing.assert_array_equal(mirrored, picture(make(scene))[:, ::-1])
@@ -224,7 +224,7 @@ def test_logs_unimplemented_addresses(camera: Ov7620, caplog: pytest.LogCaptureF
     ]
 
 
-def test_no_output_without_power(scene: EarthSunScene) -> None:
+def test_camera_has_no_output_without_power(scene: EarthSunScene) -> None:
     camera = make(scene)
     changes: list[int] = []
     camera.on_change = lambda: changes.append(1)
@@ -240,7 +240,7 @@ def test_no_output_without_power(scene: EarthSunScene) -> None:
     np.testing.assert_array_equal(lines.pixels(), picture(quiet(scene), 0))
 
 
-def test_frame_lookup(camera: Ov7620) -> None:
+def test_frame_from_returns_the_next_readout(camera: Ov7620) -> None:
     first_row = int(45 * LINE_PS)
     for frame in (0, 1, 7):
         readout = int(frame * FRAME_PS) + first_row
@@ -250,7 +250,7 @@ def test_frame_lookup(camera: Ov7620) -> None:
             assert shutter.line_ps == LINE_PS
 
 
-def test_picture_is_taken_at_the_middle_of_the_exposure_of_the_middle_row() -> None:
+def test_image_shows_the_scene_at_mid_exposure_of_the_middle_row() -> None:
     turning = EarthSunScene(rate_deg_s=(0, 30.0, 0), unevenness=0)
     camera = make(turning, EXPOSURE=200)
     tilt = 30.0 * camera.frame_from(int(3 * FRAME_PS)).mid_exposure_ps(239.5) / 10**12
@@ -259,7 +259,7 @@ def test_picture_is_taken_at_the_middle_of_the_exposure_of_the_middle_row() -> N
     assert np.mean(picture(camera) != expected) < 0.01
 
 
-def test_pictures_are_rendered_once_and_noise_belongs_to_the_frame(scene: EarthSunScene) -> None:
+def test_image_is_rendered_once_and_noise_is_per_frame(scene: EarthSunScene) -> None:
     def noisy(seed: int) -> Ov7620:
         return make(EarthSunView(scene, FisheyeCondition(seed=seed, hot_pixels=9)))
 

@@ -52,13 +52,13 @@ def abi(request: pytest.FixtureRequest) -> Abi:
     return request.param
 
 
-def test_calls_with_a_path(abi: Abi):
+def test_filter_notifies_all_calls_with_a_path(abi: Abi):
     assert len(make_filter(abi, NUMBERS)) // 8 < 255  # jumps fit
     for name in abi.calls.keys() & set(ON_PATH):
         assert decide(abi, abi.calls[name], 3, 0x1000) == NOTIFY, name
 
 
-def test_requests_of_ioctl(abi: Abi):
+def test_filter_notifies_only_i2c_ioctls(abi: Abi):
     ours = {int(number) for number in Ioctl}
     for number in [*range(0x06F0, 0x0740), 0x5401, 0x10703, 0xC0020703]:
         expected = NOTIFY if number in ours else ALLOW
@@ -68,26 +68,26 @@ def test_requests_of_ioctl(abi: Abi):
 
 
 @pytest.mark.parametrize("number", [-1, 0, 1, 2, 959, 960, 1000, 1023, 1024, 2**31])
-def test_calls_with_a_descriptor(abi: Abi, number: int):
+def test_filter_notifies_calls_on_reserved_descriptors_only(abi: Abi, number: int):
     expected = NOTIFY if number in NUMBERS else ALLOW
     for name in abi.calls.keys() & set(ON_DESCRIPTOR):
         assert decide(abi, abi.calls[name], number) == expected, name
 
 
 @pytest.mark.parametrize(("command", "sent"), [(0, True), (1030, True), (1, False), (3, False)])
-def test_copies_by_fcntl(abi: Abi, command: int, sent: bool):
+def test_filter_notifies_fcntl_duplications_only(abi: Abi, command: int, sent: bool):
     assert decide(abi, abi.calls["fcntl"], 970, command) == (NOTIFY if sent else ALLOW)
     assert decide(abi, abi.calls["fcntl"], 7, command) == ALLOW
 
 
-def test_fstat_by_an_empty_path(abi: Abi):
+def test_filter_notifies_newfstatat_with_an_empty_path(abi: Abi):
     call = abi.calls["newfstatat"]
     assert decide(abi, call, 970, 0x1000, 0x2000, 0x1000) == NOTIFY
     assert decide(abi, call, 7, 0x1000, 0x2000, 0x1000) == ALLOW
     assert decide(abi, call, 7, 0x1000, 0x2000, 0x100) == NOTIFY  # a path
 
 
-def test_everything_else_passes(abi: Abi):
+def test_filter_allows_all_other_system_calls(abi: Abi):
     for call in set(range(450)) - set(abi.calls.values()):
         assert decide(abi, call, 970, 0x0703) == ALLOW, call
     # Other processors, and their numbers.
@@ -102,7 +102,7 @@ def test_everything_else_passes(abi: Abi):
         (("aarch64", "riscv64"), "asm-generic/unistd.h"),
     ],
 )
-def test_numbers_are_those_of_the_kernel_s_headers(machines: tuple[str, ...], header: str):
+def test_system_call_numbers_equal_the_kernel_headers(machines: tuple[str, ...], header: str):
     path = Path("/usr/include", header)
     if not path.exists():
         pytest.skip(f"no {path}")
@@ -135,12 +135,12 @@ def end_of_page() -> Iterator[int]:
 
 
 @pytest.mark.parametrize("length", [0, 1, 255, 256, 300, 5000])
-def test_a_text_that_ends_with_its_page(end_of_page: int, length: int) -> None:
+def test_text_that_ends_at_a_page_boundary_is_read(end_of_page: int, length: int) -> None:
     ctypes.memset(end_of_page - 1, 0, 1)
     assert read_text(os.getpid(), end_of_page - 1 - length, 8192) == b"x" * length
 
 
-def test_a_text_is_cut_at_the_limit(end_of_page: int) -> None:
+def test_text_is_cut_at_the_limit(end_of_page: int) -> None:
     assert read_text(os.getpid(), end_of_page - 5000, 4999) == b"x" * 4999
 
 

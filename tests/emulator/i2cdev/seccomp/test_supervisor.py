@@ -33,7 +33,7 @@ from cubestack.firmware_model.formats import linux_i2c as linux
         (20, 3, 20),
     ],
 )
-def test_device_files_get_the_last_numbers_that_a_process_and_select_may_use(
+def test_device_files_get_the_highest_descriptors_usable_by_select(
     monkeypatch: pytest.MonkeyPatch, soft: int, first: int, end: int
 ) -> None:
     monkeypatch.setattr(resource, "getrlimit", lambda _which: (soft, soft))
@@ -41,7 +41,7 @@ def test_device_files_get_the_last_numbers_that_a_process_and_select_may_use(
 
 
 @pytest.mark.parametrize("value", [0, 1, 3, 100, 2**31 - 1, -1, -100, -(2**31)])
-def test_an_int_comes_in_the_low_half_of_an_argument(value: int) -> None:
+def test_int_argument_is_taken_from_the_low_32_bits(value: int) -> None:
     for rest in (0, 0xFFFF_FFFF, 0x1234_5678):
         assert supervisor._signed(rest << 32 | value & 0xFFFF_FFFF) == value
 
@@ -161,7 +161,7 @@ OURS, OTHER, LISTING = b"/dev/i2c-7\0", b"/dev/i2c-8\0", b"/proc/bus/i2c\0"
 
 @pytest.mark.parametrize("flags", [os.O_RDWR, os.O_RDWR | os.O_CLOEXEC])
 @pytest.mark.parametrize("name", ["open", "openat", "openat2"])
-def test_each_way_to_open(program: Program, name: str, flags: int) -> None:
+def test_each_open_call_returns_the_device_file(program: Program, name: str, flags: int) -> None:
     def call(path: bytes, flags: int) -> Any:
         where, folder = program.memory(path), () if name == "open" else (-100,)
         how = program.memory(struct.pack("=3Q", flags, 0, 0)) if name == "openat2" else flags
@@ -188,7 +188,7 @@ def test_removed_bus_returns_an_error(program: Program) -> None:
     assert program("openat", -100, program.memory(OURS), 0) == -errno.ENODEV
 
 
-def test_no_number_is_free() -> None:
+def test_open_without_a_free_descriptor_returns_emfile() -> None:
     taken = os.open("/dev/null", os.O_RDONLY)
     program = Program(range(taken, taken + 1))
     try:
@@ -207,7 +207,9 @@ def test_no_number_is_free() -> None:
         ("statx", "fp00b", True),
     ],
 )
-def test_each_way_to_look(program: Program, name: str, arguments: str, extended: bool) -> None:
+def test_each_stat_call_reports_the_device_file(
+    program: Program, name: str, arguments: str, extended: bool
+) -> None:
     buffer = program.memory(bytes(256))
 
     def call(path: bytes) -> Any:
@@ -222,7 +224,9 @@ def test_each_way_to_look(program: Program, name: str, arguments: str, extended:
 
 
 @pytest.mark.parametrize(("name", "flags", "buffer"), [("newfstatat", 3, 2), ("statx", 2, 4)])
-def test_stat_by_empty_path(program: Program, name: str, flags: int, buffer: int) -> None:
+def test_stat_with_an_empty_path_reports_the_device_file(
+    program: Program, name: str, flags: int, buffer: int
+) -> None:
     fd, place = program.opened(), program.memory(bytes(256))
 
     def call(path: bytes, flag: int, fd: int = fd) -> Any:
@@ -256,7 +260,9 @@ def test_stat_by_empty_path(program: Program, name: str, flags: int, buffer: int
         ("lgetxattr", False, -errno.EOPNOTSUPP),
     ],
 )
-def test_name_queries(program: Program, name: str, folder: bool, result: int) -> None:
+def test_path_query_calls_on_the_device_file_return_linux_results(
+    program: Program, name: str, folder: bool, result: int
+) -> None:
     before = (-100,) if folder else ()
     assert program(name, *before, program.memory(OURS)) == result
     assert program(name, *before, program.memory(OTHER)) == "pass"
@@ -267,7 +273,7 @@ def test_name_queries(program: Program, name: str, folder: bool, result: int) ->
         os.close(folder_fd)
 
 
-def test_reading_and_writing(program: Program) -> None:
+def test_read_and_write_calls_reach_the_device_file(program: Program) -> None:
     fd = program.opened()
     (file,), place = program.files, program.memory(bytes(8))
     file.result, file.data = 3, b"abc"
@@ -290,7 +296,7 @@ def test_reading_and_writing(program: Program) -> None:
     assert program("read", 99_999, place, 8) == "pass"
 
 
-def test_an_answer_that_comes_later(program: Program) -> None:
+def test_late_answers_are_passed_on_unless_the_caller_was_killed(program: Program) -> None:
     fd = program.opened()
     (file,) = program.files
     file.late = True
@@ -307,7 +313,7 @@ def test_an_answer_that_comes_later(program: Program) -> None:
     ("name", "arguments", "close_on_exec"),
     [("dup", (), False), ("fcntl", (0, 5), False), ("fcntl", (1030, 5), True)],
 )
-def test_descriptor_copy_is_the_same_file(
+def test_duplicated_descriptor_refers_to_the_same_file(
     program: Program, name: str, arguments: tuple[int, ...], close_on_exec: bool
 ) -> None:
     fd = program.opened()
@@ -324,7 +330,7 @@ def test_descriptor_copy_is_the_same_file(
     assert file.closed
 
 
-def test_files_that_are_open_are_closed_at_the_end(program: Program) -> None:
+def test_supervisor_closes_open_files_at_the_end(program: Program) -> None:
     program.opened()
     program.opened()
     before = len(os.listdir("/proc/self/fd"))

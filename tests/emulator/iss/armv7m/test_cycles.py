@@ -153,7 +153,7 @@ def test_40_sequences_are_compared():
 
 
 @needs_compiler
-def test_code_is_the_assembled_text(tmp_path):
+def test_recorded_machine_code_matches_the_assembled_text(tmp_path):
     text = [".syntax unified"]
     for number, sequence in enumerate(SEQUENCES):  # each from a multiple of 64
         text += [f".org {64 * number}", sequence.text.replace("; ", "\n")]

@@ -210,7 +210,7 @@ def test_pendsv_switches_tasks():
     assert (bench.log[-1].value, bench["sp"]) == (2, 0x2000_5000)
 
 
-def test_vector_table_moves():
+def test_vtor_moves_the_vector_table():
     bench = start(3)
     bench.ram[0x400:0x500] = list(bench.code[:0x100])
     bench["VTOR"] = RAM + 0x47F
@@ -232,7 +232,7 @@ def test_level_interrupt_repeats_until_its_handler_clears_the_line():
     assert (bench.ipsr, bench["ISPR"]) == (0, 0)
 
 
-def test_exception_counter_and_cycle_counter():
+def test_dwt_counts_exceptions_and_cycles_while_enabled():
     bench = start(3)
     bench["DEMCR"] = 1 << 24
     bench["CYCCNT"] = 0

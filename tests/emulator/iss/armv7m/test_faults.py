@@ -78,7 +78,7 @@ CASES = {
 
 @pytest.mark.parametrize("enabled", [True, False])
 @pytest.mark.parametrize("name", CASES)
-def test_fault(name, enabled):
+def test_faults_enter_their_handler_with_status_and_address(name, enabled):
     program, exception, cfsr, address, at = CASES[name]
     bench = run(f"nop; {program}", 200, enabled=enabled)
     assert bench.ipsr == (exception if enabled else HARD_FAULT)
@@ -98,7 +98,7 @@ def test_fault(name, enabled):
     assert bench["CFSR"] == 0
 
 
-def test_without_traps_nothing_faults():
+def test_unaligned_access_and_division_by_zero_do_not_fault_without_traps():
     unaligned, division = "ldr r2, [r0]", "udiv r3, r0, r1"
     bench = prepare(f"ldr r0, ={RAM + 1}; movs r1, #0; {unaligned}; {division}; b .")
     bench["r3"] = 99
@@ -174,7 +174,7 @@ def test_more_urgent_exception_is_entered_despite_a_stacking_error():
     assert bench["CFSR"] == STKERR
 
 
-def test_unstacking_error():
+def test_unstacking_error_is_a_bus_fault():
     bench = run(f"nop #50; @16: ldr r0, ={NOWHERE}; msr msp, r0; bx lr", 60, at=5)
     assert (bench["CFSR"] & ~STKERR, bench.ipsr) == (UNSTKERR, BUS_FAULT)
     assert bench["sp"] == NOWHERE

@@ -54,7 +54,7 @@ ALLOWED = {  # by AP: (privileged reads, writes, user reads, writes)
 
 @pytest.mark.parametrize("access", ALLOWED)
 @pytest.mark.parametrize("case", range(4))
-def test_access_permissions(access, case):
+def test_mpu_enforces_region_access_permissions(access, case):
     bench = guarded(accessing(USER, store=bool(case & 1), privileged=case < 2))
     region(bench, 2, USER, attributes(5, access))
     bench.run(100)
@@ -73,7 +73,7 @@ def test_access_permissions(access, case):
         (0, False, True),
     ],
 )
-def test_background_region(control, privileged, allowed):
+def test_mpu_background_region_is_for_privileged_access(control, privileged, allowed):
     bench = guarded(accessing(USER, False, privileged), control)
     bench.run(100)
     assert (bench.ipsr == 0) == allowed
@@ -95,7 +95,7 @@ def test_highest_numbered_region_decides_except_in_its_disabled_parts(
 JUMP = f"ldr r0, ={USER | 1}; bx r0; @4: b ."
 
 
-def test_execute_never():
+def test_mpu_execute_never_faults_instruction_fetch():
     for never in (False, True):
         bench = guarded(JUMP)
         bench.ram[0x2000:0x2002] = [0xFE, 0xE7]
@@ -105,7 +105,7 @@ def test_execute_never():
         assert bench["CFSR"] == (IACCVIOL if never else 0)
 
 
-def test_execution_faults_at_the_end_of_its_region():
+def test_fetch_past_the_end_of_its_mpu_region_faults():
     bench = guarded(JUMP)
     bench.ram[0x2000:0x2100] = [0x00, 0xBF] * 128
     region(bench, 2, USER, attributes(5, FULL))
@@ -114,7 +114,7 @@ def test_execution_faults_at_the_end_of_its_region():
     assert bench.word(0x2000_8000 - 32 + 24) == USER + 32
 
 
-def test_stacking_is_checked_with_the_rights_of_the_interrupted_code():
+def test_exception_stacking_uses_the_rights_of_the_interrupted_code():
     bench = guarded("nop #60; @4: b .")
     bench["psp"] = 0x2000_3000
     bench["control"] = 3
@@ -128,7 +128,7 @@ def test_stacking_is_checked_with_the_rights_of_the_interrupted_code():
     assert (bench["CFSR"], bench["psp"]) == (MSTKERR, 0x2000_3000 - 32)
 
 
-def test_unstacking_is_checked():
+def test_mpu_checks_exception_unstacking():
     outside = f"ldr r0, ={USER}; msr psp, r0"  # all regions
     bench = guarded(f"nop #60; @16: {outside}; bx lr; @4: b .")
     bench["psp"] = 0x2000_7000
@@ -141,14 +141,14 @@ def test_unstacking_is_checked():
 
 
 @pytest.mark.parametrize("on", [False, True])
-def test_hfnmiena_enables_it_in_the_hard_fault_handler(on):
+def test_hfnmiena_enables_the_mpu_in_the_hard_fault_handler(on):
     program = f"udf #0; @3: ldr r1, ={USER}; ldr r0, [r1]; b ."
     bench = guarded(program, ENABLE | HFNMIENA * on)
     bench.run(100)
     assert bench["locked"] == on
 
 
-def test_registers():
+def test_mpu_registers_read_and_write():
     bench = Bench()
     assert bench.read(TYPE) == 8 << 8
     bench.write(RNR, 5)

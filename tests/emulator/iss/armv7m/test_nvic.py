@@ -144,7 +144,7 @@ def one_action(chance: random.Random, bench: Bench, rules: Rules) -> None:
 
 
 @pytest.mark.parametrize("seed", range(SEEDS))
-def test_random_sequences_follow_the_rules(seed):
+def test_nvic_follows_the_reference_rules_for_random_sequences(seed):
     chance = random.Random(seed)
     bits = chance.choice([3, 3, 4, 8])
     bench, rules = Bench(priority_bits=bits), Rules(bits)

@@ -27,7 +27,7 @@ AFTER_RESET_AND_ONES = {
 
 
 @pytest.mark.parametrize("address", AFTER_RESET_AND_ONES)
-def test_register(address):
+def test_scs_registers_have_reset_values_and_writable_bits(address):
     bench = Bench()
     reset, ones = AFTER_RESET_AND_ONES[address]
     assert bench.read(address) == bench.peek(address) == reset

@@ -41,12 +41,14 @@ def call(operation: int, parameter: int = BLOCK, words: tuple[int, ...] = (), te
         (0x99, 0, (), b"", "", 0xFFFF_FFFF),
     ],
 )
-def test_call(operation, parameter, words, text, printed, result):
+def test_semihosting_call_prints_and_returns_its_result(
+    operation, parameter, words, text, printed, result
+):
     bench = call(operation, parameter, words, text)
     assert (bench.text, bench["r0"], bench.ipsr) == (printed, result, 0)
 
 
-def test_read_fills_memory():
+def test_semihosting_read_fills_memory():
     bench = call(0x06, BLOCK, (1, TEXT, 4))
     assert (bytes(bench.ram[0x200:0x205]), bench["r0"]) == (b"????\0", 0)
 
@@ -61,7 +63,7 @@ def test_exit_stops_the_run(operation, parameter, words, code):
     assert bench["exit_code"] == code
 
 
-def test_without_semihosting_it_is_a_fault():
+def test_semihosting_breakpoint_faults_when_disabled():
     bench = Bench("bkpt #0xAB; @3: b .")
     bench.run(50)
     assert bench.ipsr == 3

@@ -43,14 +43,14 @@ def test_voltage_is_converted_to_its_code(channel: int, reference: int, full: fl
 
 
 @pytest.mark.parametrize(("volts", "code"), [(-0.1, 0), (0.0, 0), (2.4999, 4095), (3.0, 4095)])
-def test_codes_saturate(volts: float, code: int) -> None:
+def test_adc_codes_saturate(volts: float, code: int) -> None:
     bench = adc()
     bench.machine.analog[0] = volts
     assert convert(bench, control(0)) == code
 
 
 @pytest.mark.parametrize(("resolution", "bits"), [(0, 12), (1, 8), (2, 6)])
-def test_resolutions_and_adjustment(resolution: int, bits: int) -> None:
+def test_adc_supports_resolutions_and_left_adjustment(resolution: int, bits: int) -> None:
     bench = adc()
     bench.machine.analog[0] = 1.3
     code = int(1.3 / 2.5 * (1 << bits))
@@ -66,7 +66,7 @@ def test_oversampling_adds_bits(oversampling: int, bits: int) -> None:
     assert convert(bench, control(0, resolution=3)) == int(1.3 / 2.5 * (1 << bits))
 
 
-def test_differences_have_a_sign() -> None:
+def test_differential_adc_codes_are_signed() -> None:
     bench = adc()
     bench.machine.analog[2], bench.machine.analog[3] = 1.0, 1.5
     assert convert(bench, control(1, more=2)) == (-410) & 0xFFFF_FFFF
@@ -82,7 +82,7 @@ def test_temperature_by_the_calibration_of_the_device_information(celsius: float
     assert abs(calibrated_at - (reading - code) / -6.27 - celsius) < 0.2
 
 
-def test_internal_voltages() -> None:
+def test_adc_converts_internal_voltages() -> None:
     bench = adc()
     assert convert(bench, control(9)) == int(1.1 / 2.5 * 4096)
     assert convert(bench, control(10, SUPPLY_TWICE)) == 2048
@@ -94,7 +94,9 @@ def test_internal_voltages() -> None:
     ("acquisition", "prescaler", "resolution", "clocks"),
     [(0, 0, 0, 14), (4, 0, 0, 29), (8, 3, 0, 269), (0, 1, 1, 10), (0, 0, 2, 8)],
 )
-def test_conversion_time(acquisition: int, prescaler: int, resolution: int, clocks: int) -> None:
+def test_adc_conversion_takes_the_documented_time(
+    acquisition: int, prescaler: int, resolution: int, clocks: int
+) -> None:
     bench = adc()
     bench["ADC0.CTRL"] = 14 << 16 | prescaler << 8
     bench.load("ADC0", SINGLECTRL=control(0, V2_5, resolution, acquisition << 20), CMD=1)
@@ -135,7 +137,7 @@ def test_repetition_continues_until_stopped() -> None:
     assert not bench.is_set("ADC0.STATUS.SINGLEACT")
 
 
-def test_scan_of_several_channels_by_dma() -> None:
+def test_adc_scan_of_several_channels_is_read_by_dma() -> None:
     bench = adc()
     for channel in range(8):
         bench.machine.analog[channel] = 0.25 * channel
@@ -149,7 +151,7 @@ def test_scan_of_several_channels_by_dma() -> None:
     assert bench["DMA.IF"] == 1
 
 
-def test_conversion_interrupts() -> None:
+def test_adc_conversion_raises_an_interrupt() -> None:
     bench = adc(SINGLECTRL=control(0), IEN=1)
     bench["ADC0.CMD"] = 1
     bench.run_for(MS)
@@ -177,7 +179,7 @@ def apply(bench: Bench, index: int, volts: float) -> None:
 
 
 @pytest.mark.parametrize("warm_time", range(8))
-def test_comparator_warm_up_time(warm_time: int) -> None:
+def test_comparator_is_active_after_its_warm_up_time(warm_time: int) -> None:
     bench = acmp(more=warm_time << 8)
     bench.run_for((4 << warm_time) * S // HZ - 4 * S // HZ)
     if warm_time > 1:
@@ -226,7 +228,7 @@ def test_comparator_follows_its_input_selection_and_the_supply() -> None:
     assert bench.is_set("ACMP0.STATUS.ACMPOUT")
 
 
-def test_comparator_hysteresis() -> None:
+def test_comparator_applies_its_hysteresis() -> None:
     bench = acmp(select=NEGATIVE_1V25, more=EDGES | 7 << 4)
     bench.run_for(MS)
     for volts, output in ((1.30, False), (1.31, True), (1.20, True), (1.19, False)):
@@ -249,7 +251,7 @@ def test_comparator_wakes_from_em2() -> None:
     assert bench.machine.energy_mode == 0
 
 
-def test_supply_comparator() -> None:
+def test_supply_comparator_detects_low_voltage() -> None:
     bench = acmp()
     bench["VCMP.INPUTSEL"] = 30  # 1.667 V + 30 * 34 mV
     bench.load("VCMP", IEN=1, CTRL=1 | EDGES)

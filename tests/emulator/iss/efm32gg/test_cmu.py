@@ -130,7 +130,7 @@ def test_too_few_wait_states_are_reported() -> None:
         max_size=8,
     )
 )
-def test_time_is_exact_over_clock_changes(steps: list[tuple[int, int, int, int, int]]) -> None:
+def test_time_is_exact_across_clock_changes(steps: list[tuple[int, int, int, int, int]]) -> None:
     bench = Bench()
     low, high, cycles = Fraction(bench.now), Fraction(bench.now), bench.machine.cycles
     hz = Fraction(14_000_000)

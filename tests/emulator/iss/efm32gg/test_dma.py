@@ -70,7 +70,7 @@ def test_automatic_transfer_copies_and_stops() -> None:
 
 
 @pytest.mark.parametrize("size", [BYTES, HALVES, WORDS])
-def test_item_sizes_and_increments(size: int) -> None:
+def test_dma_applies_item_sizes_and_increments(size: int) -> None:
     bench = dma()
     width = 1 << size
     word = control(AUTO, 8, size, 10, target=WORDS)
@@ -121,7 +121,7 @@ def test_uart_receives_by_ping_pong() -> None:
     assert received == [0x40 + byte for byte in range(20)]
 
 
-def test_ping_pong_ends_at_a_descriptor_that_was_not_renewed() -> None:
+def test_dma_ping_pong_ends_at_a_used_descriptor() -> None:
     bench = receiver()
     word = control(PING_PONG, 1, BYTES, source=FIXED)
     describe(bench, 0, RXDATA, TARGET, word)
@@ -143,7 +143,7 @@ def test_uart_sends_text_by_dma() -> None:
     assert bench["DMA.IF"] == 2
 
 
-def test_masked_request_waits() -> None:
+def test_masked_dma_request_waits() -> None:
     bench = receiver()
     describe(bench, 0, RXDATA, TARGET, control(BASIC, 1, BYTES, source=FIXED))
     bench.load("DMA", CH0_CTRL=UART0_RX, CHREQMASKS=1, CHENS=1)
@@ -161,7 +161,7 @@ def scatter_gather(bench: Bench, cycle: int, *tasks: tuple[int, int, int]) -> No
     describe(bench, 0, TASKS + 16 * len(tasks) - 4, ALTERNATE + 12, word)
 
 
-def test_memory_scatter_gather() -> None:
+def test_dma_memory_scatter_gather_runs_its_tasks() -> None:
     bench = dma()
     scatter_gather(
         bench,
@@ -230,7 +230,7 @@ def test_no_transfer_without_clock_or_enable(name: str) -> None:
     assert words(bench, TARGET, 1) != [0]
 
 
-def test_base_of_primary_and_alternate_descriptors() -> None:
+def test_dma_base_registers_are_aligned() -> None:
     bench = dma()
     bench["DMA.CTRLBASE"] = 0x2000_07FF
     assert bench["DMA.CTRLBASE"] == 0x2000_0600

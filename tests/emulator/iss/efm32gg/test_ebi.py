@@ -34,7 +34,7 @@ def cost(bench: Bench, size: int, *, write: bool = False, address: int = BANK) -
 
 
 @pytest.mark.parametrize("mode", [D8A8, D16A16ALE, D8A24ALE, D16])
-def test_memory_access_in_all_modes_and_sizes(mode: int) -> None:
+def test_ebi_memory_is_accessed_in_all_modes_and_sizes(mode: int) -> None:
     machine = ebi(mode).machine
     assert machine.write(BANK + 4, 0x1234_5678)
     assert machine.write(BANK + 8, 0xABCD, 2)
@@ -60,7 +60,7 @@ def test_memory_access_in_all_modes_and_sizes(mode: int) -> None:
         (D16A16ALE, 4, 12),
     ],
 )
-def test_cycles_of_a_read(mode: int, size: int, cycles: int) -> None:
+def test_ebi_read_takes_the_documented_cycles(mode: int, size: int, cycles: int) -> None:
     assert cost(ebi(mode), size) == cycles
 
 

@@ -232,7 +232,7 @@ def test_watchdog_runs_in_deep_sleep_if_configured(runs: int, resets: bool) -> N
     assert watchdog_reset(bench) is resets
 
 
-def test_watchdog_period_on_the_crystal() -> None:
+def test_watchdog_period_follows_the_crystal() -> None:
     bench = Bench().clock("LE")
     bench.command("CMU.OSCENCMD.LFXOEN")
     bench.run_for(1401 * MS)

@@ -57,7 +57,9 @@ def test_disabled_pin_reads_0_and_enabled_pin_its_level() -> None:
         (AND_UP, 0, -1, 0),
     ],
 )
-def test_pin_level(mode: int, dout: int, outside: int, level: int) -> None:
+def test_gpio_pin_level_follows_mode_and_output(
+    mode: int, dout: int, outside: int, level: int
+) -> None:
     bench = gpio()
     bench.machine.pin(F, 2, outside)
     bench.load("GPIO", PF_DOUT=dout << 2, PF_MODEL=mode << 8)
@@ -152,7 +154,7 @@ def test_pin_drives_another_pin_through_the_prs() -> None:
     assert pins(bench) == [(1, 1)]
 
 
-def test_software_pulse_of_the_prs() -> None:
+def test_prs_software_pulse_reaches_the_pin() -> None:
     bench = Bench().clock("GPIO", "PRS")
     bench["PRS.ROUTE"] = 1
     bench["GPIO.PA_MODEL"] = PUSH_PULL

@@ -290,7 +290,7 @@ def test_repeated_start_sets_its_flag() -> None:
     assert flags(bench, "RSTART")
 
 
-def test_address_mask_and_general_call() -> None:
+def test_i2c_slave_answers_masked_addresses_and_general_calls() -> None:
     bench, machine = slave("AUTOACK")
     assert machine.i2c_slave_start(0, 0) == 0
     machine.i2c_slave_stop(0)
@@ -346,7 +346,7 @@ def test_reset_releases_the_bus() -> None:
     assert state(bench.clock("I2C0")) == 1
 
 
-def test_unit_is_found_by_its_pin() -> None:
+def test_i2c_slave_is_found_by_its_pin() -> None:
     _, machine = slave("AUTOACK")
     assert machine.i2c_slave_start(0x100, ADDRESS) == 0
     assert machine.i2c_slave_start(0x100 | PD14, ADDRESS) == 1

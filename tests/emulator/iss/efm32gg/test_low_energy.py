@@ -247,7 +247,7 @@ def test_received_character_wakes_from_em2() -> None:
     assert bench["LEUART0.RXDATA"] == 0x7E
 
 
-def test_leuart_start_and_signal_frames() -> None:
+def test_leuart_recognises_start_and_signal_frames() -> None:
     bench = leuart(control=mask_of("LEUART.CTRL.SFUBRX"))
     bench.load("LEUART0", STARTFRAME=0x02, SIGFRAME=0x03, CMD=0x10)
     bench.run_for(4 * TICK)
@@ -340,7 +340,7 @@ def test_burtc_interrupts_at_its_compare_value() -> None:
     assert (bench.peek("BURTC.IF"), bench.pending()) == (2, [BURTC_IRQ])
 
 
-def test_burtc_prescaler_and_lock() -> None:
+def test_burtc_applies_prescaler_and_lock() -> None:
     bench = burtc(ULFRCO | 3 << 8)
     bench.run_for(800 * MS)
     assert abs(bench["BURTC.CNT"] - 100) <= 1

@@ -208,7 +208,7 @@ def test_wait_states_cost_nothing_inside_the_cache() -> None:
         pytest.param(500, 4, False, 1.3, 1.65, id="loop larger than the cache of 512 bytes"),
     ],
 )
-def test_cycles_per_instruction(
+def test_cycles_per_instruction_depend_on_wait_states_and_cache(
     nops: int, mode: int, disabled: bool, least: float, most: float
 ) -> None:
     assert least <= cycles_of_a_loop(mode=mode, disabled=disabled, nops=nops) < most

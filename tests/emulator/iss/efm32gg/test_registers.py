@@ -65,7 +65,7 @@ def test_writable_bits_keep_their_values(name: str, pattern: int) -> None:
         assert value == pattern & register.writable, register.name
 
 
-def test_byte_and_halfword_accesses_of_a_register() -> None:
+def test_registers_accept_byte_and_halfword_accesses() -> None:
     bench = Bench().clock("GPIO")
     assert bench.machine.write(0x4000_6004, 0x12, 1)
     assert bench.machine.write(0x4000_6006, 0x3456, 2)

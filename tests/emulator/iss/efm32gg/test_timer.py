@@ -99,7 +99,7 @@ def test_counts_like_a_stepped_counter(
 
 
 @pytest.mark.parametrize("prescaler", range(11))
-def test_prescaler(prescaler: int) -> None:
+def test_timer_counts_with_its_prescaler(prescaler: int) -> None:
     bench = timer(prescaler=prescaler)
     origin = start(bench)
     bench.run_until(origin + (100 * (1 << prescaler)) * S // HZ)
@@ -126,7 +126,7 @@ def test_one_shot_stops_at_the_overflow() -> None:
     assert bench["TIMER0.CNT"] == 0
 
 
-def test_stop_and_continue() -> None:
+def test_timer_stops_and_continues() -> None:
     bench = timer()
     start(bench)
     ticks(bench, 100)
@@ -233,7 +233,7 @@ def test_edges_start_and_stop_the_timer() -> None:
     assert abs(bench["TIMER0.CNT"] - 60) <= 1
 
 
-def test_counter_follows_its_clock() -> None:
+def test_timer_counts_at_its_divided_and_gated_clock() -> None:
     bench = timer()
     start(bench)
     ticks(bench, 1000)

@@ -32,7 +32,7 @@ def sent(bench: Bench) -> list[int]:
 
 @pytest.mark.parametrize("clkdiv", [0, 64, 3648, 14 << 8 | 0xC0, 0x1FFFC0])
 @pytest.mark.parametrize(("ovs", "oversampling"), [(0, 16), (1, 8), (2, 6), (3, 4)])
-def test_character_duration(clkdiv: int, ovs: int, oversampling: int) -> None:
+def test_usart_character_has_its_duration(clkdiv: int, ovs: int, oversampling: int) -> None:
     bench = uart(clkdiv, control=ovs << 5)
     bench["UART0.TXDATA"] = 0x5A
     frame_ps = 10 * bit_ps(clkdiv, oversampling)
@@ -68,7 +68,7 @@ def test_back_to_back_characters_do_not_drift() -> None:
         (0x1001, 12),  # 4N1
     ],
 )
-def test_frame_formats(frame: int, halves: int) -> None:
+def test_usart_frame_formats_have_their_durations(frame: int, halves: int) -> None:
     bench = uart(0, frame)
     bench["UART0.TXDATAX"] = 0x1FF
     [item] = bench.out(OutgoingKind.UART)
@@ -116,7 +116,7 @@ def test_nothing_is_sent_without_route_pin_clock_or_transmitter() -> None:
     assert sent(bench) == [1]
 
 
-def test_break_and_disable_after_a_character() -> None:
+def test_usart_sends_break_and_disables_after_a_character() -> None:
     bench = uart()
     bench["UART0.TXDATAX"] = mask_of("USART.TXDATAX.TXBREAK") | mask_of("USART.TXDATAX.TXDISAT")
     assert sent(bench) == [0x10000]
@@ -142,7 +142,7 @@ def test_receive_buffer_overflows_at_the_fourth_character() -> None:
     assert bench.is_set("UART0.IF.RXUF")
 
 
-def test_error_flags_of_a_character() -> None:
+def test_usart_reports_framing_and_parity_errors_per_character() -> None:
     bench = uart()
     bench.machine.uart_receive(UART0, 0x55, 1)
     bench.machine.uart_receive(UART0, 0x66, 2)
@@ -171,7 +171,7 @@ def test_character_is_received_by_the_unit_at_the_pin() -> None:
     assert not bench.is_set("UART0.STATUS.RXDATAV")
 
 
-def test_double_registers_hold_two_characters() -> None:
+def test_usart_double_registers_hold_two_characters() -> None:
     bench = uart()
     bench["UART0.TXDOUBLE"] = 0x4241
     bench.run_for(22 * int(bit_ps(0)))
@@ -181,7 +181,7 @@ def test_double_registers_hold_two_characters() -> None:
     assert (bench["UART0.RXDOUBLEXP"], bench["UART0.RXDOUBLE"]) == (0x32_0031, 0x3231)
 
 
-def test_loopback() -> None:
+def test_usart_loopback_receives_the_sent_byte() -> None:
     bench = uart(control=mask_of("USART.CTRL.LOOPBK"))
     bench["UART0.TXDATA"] = 0xA5
     bench.run_for(9 * int(bit_ps(0)))

@@ -20,7 +20,7 @@ def test_packet_is_framed_with_its_checksum() -> None:
 
 
 @given(st.binary())
-def test_escaped_data_are_unescaped_unchanged(data: bytes) -> None:
+def test_gdb_escaping_round_trips(data: bytes) -> None:
     escaped = escape(data)
     assert not set(escaped) & set(b"$#*")
     assert unescape(escaped) == data
@@ -65,7 +65,7 @@ def test_connecting_halts_the_target(talk: Talk) -> None:
     assert (talk.ask("?") or b"").startswith(b"T02thread:1;")
 
 
-def test_features_are_announced(talk: Talk) -> None:
+def test_gdb_server_announces_its_features(talk: Talk) -> None:
     features = (talk.ask("qSupported:multiprocess+;swbreak+;xmlRegisters=arm") or b"").split(b";")
     assert {b"QStartNoAckMode+", b"qXfer:features:read+", b"qXfer:memory-map:read+"} <= {*features}
 
@@ -76,7 +76,7 @@ def test_client_can_switch_acknowledgements_off(talk: Talk) -> None:
     assert talk.session.output.startswith(b"$")
 
 
-def test_answer_is_repeated_on_request(talk: Talk) -> None:
+def test_negative_acknowledge_repeats_the_answer(talk: Talk) -> None:
     talk.ask("p0")
     talk.send(b"-")
     assert talk.answer() == b"00000000"
@@ -98,7 +98,7 @@ def test_memory_map_has_flash_blocks(talk: Talk) -> None:
     assert b'<memory type="ram" start="0x20000000" length="0x400"/>' in text
 
 
-def test_registers_are_read_and_written(talk: Talk) -> None:
+def test_gdb_reads_and_writes_registers(talk: Talk) -> None:
     everything = talk.ask("g") or b""
     assert len(everything) == 8 * len(REGISTERS)
     assert everything[8 * 15 : 8 * 16] == b"0f000000"
@@ -119,7 +119,7 @@ def test_memory_is_read_and_written(talk: Talk) -> None:
     assert talk.ask(f"M{RAM:x},2:00") == b"E01"
 
 
-def test_flash_changes_when_the_client_is_done(talk: Talk) -> None:
+def test_gdb_flash_writes_take_effect_at_flash_done(talk: Talk) -> None:
     talk.target.write(0, bytes(128))
     assert talk.ask("vFlashErase:40,40") == b"OK"
     assert talk.ask(b"vFlashWrite:50:" + escape(b"a:}c")) == b"OK"
@@ -147,7 +147,7 @@ def test_interrupt_halts_the_target(talk: Talk) -> None:
     ("packet", "low", "high"),
     [("s", 0, 0), ("vCont;s:1;c", 0, 0), ("vCont;r100,110:1", 0x100, 0x110), ("S05", 0, 0)],
 )
-def test_step_passes_its_range(talk: Talk, packet: str, low: int, high: int) -> None:
+def test_gdb_step_passes_its_address_range(talk: Talk, packet: str, low: int, high: int) -> None:
     assert (talk.ask(packet) or b"").startswith(b"T05")
     assert talk.target.calls == [("step", low, high)]
 
@@ -191,7 +191,7 @@ def test_target_runs_after_detach_and_kill(talk: Talk, packet: str) -> None:
     assert talk.target.halted is None
 
 
-def test_target_is_restarted(talk: Talk) -> None:
+def test_gdb_restarts_the_target(talk: Talk) -> None:
     assert talk.ask("!") == b"OK"
     assert talk.ask("R00") is None
     assert (talk.ask("vRun;") or b"").startswith(b"T05")

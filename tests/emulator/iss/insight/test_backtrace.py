@@ -99,7 +99,7 @@ def test_bl_of_any_distance_is_a_call(scene: Scene, upper: int, lower: int) -> N
         0xF800_E000,
     ],
 )
-def test_word_that_follows_no_call_is_skipped(scene: Scene, code: int) -> None:
+def test_backtrace_skips_words_that_follow_no_call(scene: Scene, code: int) -> None:
     scene.push(scene.call(0x240, code), scene.call(0x340))
     assert scene.frames() == [Frame(0x110, 0x110), Frame(0x340, 0x33E, SCAN)]
 
@@ -109,7 +109,7 @@ def test_even_word_and_address_outside_the_program_are_skipped(scene: Scene) -> 
     assert [frame.address for frame in scene.frames()] == [0x110, 0x340]
 
 
-def test_frames_of_one_word_are_all_found(scene: Scene) -> None:
+def test_backtrace_finds_one_word_frames(scene: Scene) -> None:
     scene.push(scene.call(0x240), scene.call(0x340), scene.call(0x420))
     found = [scene.symbols.function_at(frame.place) for frame in scene.frames()]
     assert [one.name for one in found if one] == ["f1", "f2", "f3", "f4"]
@@ -154,7 +154,7 @@ def test_unreadable_exception_frame_ends_the_backtrace(scene: Scene) -> None:
     assert len(scene.frames()) == 1
 
 
-def test_frame_information_restores_the_registers_of_the_caller(scene: Scene) -> None:
+def test_unwinder_restores_the_registers_of_the_caller(scene: Scene) -> None:
     """Registers are saved below the canonical frame address, which is the caller's SP."""
     scene.rules(0x100, 12, r4=-12, r14=-4)
     scene.rules(0x200, 4, r14=-4)
@@ -169,7 +169,7 @@ def test_frame_information_restores_the_registers_of_the_caller(scene: Scene) ->
     ]
 
 
-def test_frame_information_is_that_of_the_address_in_the_function(scene: Scene) -> None:
+def test_unwinder_uses_the_rule_of_the_current_address(scene: Scene) -> None:
     scene.rules(0x100, 4, r14=-4)
     scene.push(scene.call(0x220))
     scene.registers[PC] = 0x17E

@@ -20,7 +20,7 @@ def crash(machine: Machine, symbols: Symbols, how: int) -> str:
     return report
 
 
-def test_report_before_any_fault_says_so(machine: Machine, symbols: Symbols) -> None:
+def test_fault_report_states_that_no_fault_occurred(machine: Machine, symbols: Symbols) -> None:
     run(machine, PS_PER_MS)
     assert not unhandled(machine)
     assert last_fault(machine).count == 0
@@ -47,14 +47,14 @@ def test_report_of_a_division_by_zero_has_cause_and_calls(
         pytest.param(3, ["stack overflow?", "overflow"], id="stack overflow"),
     ],
 )
-def test_report_has_the_cause(
+def test_fault_report_names_the_cause(
     machine: Machine, symbols: Symbols, how: int, texts: list[str]
 ) -> None:
     report = crash(machine, symbols, how)
     assert all(text in report for text in texts)
 
 
-def test_report_without_symbols(machine: Machine, symbols: Symbols) -> None:
+def test_fault_report_works_without_symbols(machine: Machine, symbols: Symbols) -> None:
     crash(machine, symbols, 1)
     report = fault_report(machine, Symbols(None), machine.now_ps)
     assert "DIVBYZERO" in report

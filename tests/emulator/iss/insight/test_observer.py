@@ -53,7 +53,7 @@ def self_cycles(observer: Observer, name: str) -> int:
     return sum(code.cycles_of(function.address, function.end) for code in observer.codes)
 
 
-def test_cycles_of_instructions_and_idle_cycles_are_all_cycles(observer: Observer) -> None:
+def test_instruction_and_idle_cycles_add_up_to_all_cycles(observer: Observer) -> None:
     counted = sum(int(code.cycles.sum()) for code in observer.codes)
     idle = observer.figures().idle_cycles
     assert idle > 0.9 * observer.machine.cycles
@@ -98,7 +98,7 @@ def test_lowest_stack_pointer_is_recorded(observer: Observer) -> None:
     assert 32 <= top - figures.main_sp < 128
 
 
-def test_observed_machine_behaves_as_one_that_is_not(machine: Machine, observer: Observer) -> None:
+def test_observing_a_machine_does_not_change_it(machine: Machine, observer: Observer) -> None:
     other = Machine()
     assert machine.image is not None
     other.load(machine.image)
@@ -136,7 +136,7 @@ def test_callgrind_reads_the_profile(observer: Observer, tmp_path: Path) -> None
     assert found["main"] == calls(observer, "main").cycles
 
 
-def test_coverage_has_lines_and_functions(observer: Observer, symbols: Symbols) -> None:
+def test_lcov_output_has_line_and_function_counts(observer: Observer, symbols: Symbols) -> None:
     stream = io.StringIO()
     write_lcov(observer, stream)
     text = stream.getvalue()
@@ -168,7 +168,7 @@ def test_history_has_functions_and_exceptions_with_their_times(
     assert list(history.take()) == []
 
 
-def test_full_history_ends_a_run(machine: Machine, symbols: Symbols) -> None:
+def test_run_ends_when_the_history_buffer_is_full(machine: Machine, symbols: Symbols) -> None:
     observer = Observer(machine, symbols)
     history = History(observer, {})
     while machine.now_ps < RUN_PS * 3:

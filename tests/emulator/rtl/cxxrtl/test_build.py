@@ -74,7 +74,7 @@ def test_library_depends_on_all_its_sources(quick_compiler, cache, monkeypatch):
 
 @pytest.mark.slow
 @needs_compiler
-def test_two_processes_may_build_at_once(cache):
+def test_two_processes_can_build_the_same_library_at_once(cache):
     program = (
         "from pathlib import Path\n"
         "from cubestack.emulator.native import cache\n"
@@ -94,7 +94,7 @@ def test_two_processes_may_build_at_once(cache):
 
 
 @needs_compiler
-def test_compiled_where_there_is_a_compiler_and_nothing_printed(cache, capfd, recwarn):
+def test_compiled_engine_is_the_default_and_builds_silently(cache, capfd, recwarn):
     assert isinstance(make_engine(wiring()), CompiledEngine)
     assert capfd.readouterr() == ("", "")
     assert not recwarn.list
@@ -112,7 +112,7 @@ def test_compiler_that_fails_is_one_line_with_its_log(cache, tmp_path, monkeypat
     assert capfd.readouterr() == ("", "")
 
 
-def test_simulator_with_a_warning_where_there_is_no_compiler(without_compiler, cache):
+def test_missing_compiler_falls_back_to_the_simulator_with_a_warning(without_compiler, cache):
     with pytest.warns(UserWarning, match=r"^no C\+\+ compiler .*\); using the Amaranth"):
         engine = make_engine(wiring())
     assert isinstance(engine, SimulatedEngine)
@@ -121,7 +121,7 @@ def test_simulator_with_a_warning_where_there_is_no_compiler(without_compiler, c
     assert not cache.exists()
 
 
-def test_cache_that_can_not_be_used(tmp_path, monkeypatch):
+def test_unusable_cache_folder_raises_compiler_error(tmp_path, monkeypatch):
     (tmp_path / "file").write_text("")
     monkeypatch.setattr(caches, "cache_folder", lambda: tmp_path / "file" / "cubestack")
     monkeypatch.setenv("CXX", str(make_compiler(tmp_path, "mycc", "exit 1")))

@@ -37,13 +37,13 @@ def steps(wiring: Wiring, text: str) -> str:
     return clock_steps(wiring, text, dict(members(text)), 0)
 
 
-def test_the_release_of_the_reset_is_waited_for(star):
+def test_compiled_step_handles_the_release_of_reset(star):
     text = steps(*star)
     assert "in_reset(std::integral_constant<int, 0>) const { return p_pix__reset" in text
     assert len(re.findall(r"^changed \|= ", text, re.MULTILINE)) == 11
 
 
-def test_a_falling_clock_moves_the_write_strobe_alone(star):
+def test_falling_clock_edge_changes_only_the_write_strobe(star):
     fall = steps(*star).partition("void fall(")[2]
     outputs = {name for name in members(star[1]) if name.startswith(("p_SRAM", "p_ACK", "p_DATA"))}
     own = {name for name in outputs if f"> {name};" not in fall and f"{name} = " in fall}
@@ -68,13 +68,13 @@ def test_unknown_statements_fall_back_to_eval(star, found, instead):
     assert "return true; }" in steps(wiring, text.replace(found, instead))
 
 
-def test_memories_are_followed_where_they_can_move():
+def test_compiled_step_tracks_a_selectable_memory():
     wiring = cubestar_double_wiring(CubeStarDouble(5, 3))
     # INTO is held, not known: either memory may be the one.
     assert "return 3u >> memory & 1;" in steps(wiring, variant(wiring))
 
 
-def test_the_memory_of_the_board_that_does_not_store_stays_as_it_is():
+def test_compiled_burst_changes_only_the_memory_of_the_storing_board():
     wiring = cubestar_two_boards_wiring(CubeStarTwoBoards(5, 3))
     text = rtlil_text(wiring.component)
     for levels in wiring.burst_levels[::2]:
@@ -83,7 +83,7 @@ def test_the_memory_of_the_board_that_does_not_store_stays_as_it_is():
         assert f"return {1 << own}u >> memory & 1;" in made, levels
 
 
-def test_registers_that_nothing_clocks_are_inputs():
+def test_unclocked_registers_become_inputs_of_the_compiled_step():
     wiring = cubestar_double_wiring(CubeStarDouble(32, 16))
     text = variant(wiring)
     assert {"p_into", "p_bus_2e_latched"} < {*input_names(text)}
@@ -103,7 +103,7 @@ def registers(text: str) -> set[str]:
     return {name for name, kind in members(text).items() if kind.startswith("wire")}
 
 
-def test_each_way_to_store_has_one():
+def test_compiled_bursts_exist_for_each_store_state():
     assert len(WIRING.burst_levels) == 5
     assert all(dict(levels)["CLK"] == dict(levels)["EDGE"] == 0 for levels in WIRING.burst_levels)
 
@@ -111,7 +111,7 @@ def test_each_way_to_store_has_one():
 @pytest.mark.parametrize(
     "levels", quick(map(pytest.param, WIRING.burst_levels), 1), ids=lambda levels: str(dict(levels))
 )
-def test_the_writers_stay_and_their_state_that_no_output_shows(rtlil, levels):
+def test_burst_variant_keeps_the_writers_and_their_hidden_state(rtlil, levels):
     pins = dict(levels)
     side, domain = ("nadir" if pins["SUNEN"] else "sun"), "pix"
     if pins["SHIFT"]:
@@ -126,18 +126,18 @@ def test_the_writers_stay_and_their_state_that_no_output_shows(rtlil, levels):
     assert left < registers(cxxrtl_text(WIRING.component))
 
 
-def test_without_fixed_levels_every_register_stays(rtlil):
+def test_variant_without_fixed_levels_keeps_every_register(rtlil):
     assert registers(variant_text(rtlil, ())) == registers(cxxrtl_text(WIRING.component))
 
 
-def test_names_the_wrong_input(rtlil):
+def test_unknown_variant_input_is_named_in_the_error(rtlil):
     with pytest.raises(ValueError, match="no one-bit input SUNENN"):
         variant_text(rtlil, [("SUNENN", 0)])
     with pytest.raises(ValueError, match="no one-bit input SUN_Y"):
         variant_text(rtlil, [("SUN_Y", 0)])
 
 
-def test_the_header_has_the_link_clock_detected_and_the_state_copied(rtlil):
+def test_pins_header_detects_the_link_clock_and_copies_state(rtlil):
     design = cxxrtl_text(WIRING.component)
     header = pins_header(WIRING, design, [variant_text(rtlil, FIRST)])
     assert "#define VARIANTS VARIANT(0)\n" in header

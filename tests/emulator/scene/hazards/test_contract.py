@@ -44,7 +44,7 @@ def off_axis_deg(state: sky.CameraState, vector: np.ndarray) -> float:
         ((0, -1e-9, 0), (0, -1, 0)),
     ],
 )
-def test_a_direction_is_three_numbers_or_two_angles(values: Any, vector: Any) -> None:
+def test_direction_is_a_vector_or_two_angles(values: Any, vector: Any) -> None:
     np.testing.assert_allclose(sky.direction("it", values), vector, atol=1e-12)
 
 
@@ -65,7 +65,7 @@ def test_rejects_invalid_directions(right: str, values: Any) -> None:
         sky.direction("it", values)
 
 
-def test_angles_are_exact_for_small_ones_too() -> None:
+def test_angle_between_vectors_is_exact_for_small_angles() -> None:
     for angle in (1e-9, 1e-4, 1.0, 3.0, np.pi):
         vectors = np.array([[np.cos(angle), np.sin(angle), 0.0], [1.0, 0.0, 0.0]])
         expected = [angle, 0.0]
@@ -73,7 +73,7 @@ def test_angles_are_exact_for_small_ones_too() -> None:
         np.testing.assert_allclose(found, expected, rtol=1e-7, atol=1e-15)
 
 
-def test_places_are_in_the_picture_and_all_over_it() -> None:
+def test_random_directions_cover_the_whole_field() -> None:
     generator = np.random.default_rng(2)
     vectors = np.array([ROUND.random_direction(generator) for _ in range(2000)])
     np.testing.assert_allclose(np.linalg.norm(vectors, axis=1), 1)
@@ -90,7 +90,7 @@ def test_places_are_in_the_picture_and_all_over_it() -> None:
 
 
 @pytest.mark.parametrize("angle_deg", [0.0, 10.0, 90.0, 170.0])
-def test_beside_and_aside_are_at_the_angle_to_any_side(angle_deg: float) -> None:
+def test_random_directions_at_an_angle_are_uniform_around_the_boresight(angle_deg: float) -> None:
     generator = np.random.default_rng(3)
     places = [ROUND.random_direction_at(angle_deg, generator) for _ in range(200)]
     others = [sky.random_direction_at(ROUND.boresight, angle_deg, generator) for _ in range(200)]
@@ -114,7 +114,7 @@ def test_plain_hazard_has_no_effect() -> None:
         sky.check_hazards((nothing, 5))
 
 
-def test_the_earth_s_radiance_is_that_of_its_albedo() -> None:
+def test_earth_radiance_follows_from_its_albedo() -> None:
     """0.3 of the Sun's light on a Lambert surface, by pi; the Sun is V -26.74."""
     assert np.pi * sky.EARTH_RADIANCE / 10 ** (0.4 * 26.74) == pytest.approx(0.3)
 
@@ -130,7 +130,7 @@ class Fog(Hazard):
     kind: str = "sea"
 
 
-def test_one_of_a_strength_has_a_seed_of_its_own_that_repeats() -> None:
+def test_sampled_hazard_has_a_reproducible_seed() -> None:
     first, again = (Fog.sample(3.0, None, np.random.default_rng(5)) for _ in range(2))
     assert first == again
     assert first.banks == 3
@@ -142,7 +142,7 @@ KINDS = list(SKY_HAZARDS.values())
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
-def test_hazard_describes_itself(kind: type[sky.SkyHazard]) -> None:
+def test_hazard_has_a_description_strengths_and_defaults(kind: type[sky.SkyHazard]) -> None:
     assert 4 < len(kind.meaning) < 70
     assert 5 <= len(kind.strength.values) <= 7
     assert kind.strength.usual in kind.strength.values
@@ -174,7 +174,7 @@ def test_worst_disturbs_more_than_mildest(kind: type[sky.SkyHazard]) -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
-def test_is_drawn_from_the_generator_alone(kind: type[sky.SkyHazard]) -> None:
+def test_sampled_hazard_depends_only_on_the_generator(kind: type[sky.SkyHazard]) -> None:
     first, same, other = (
         kind.sample(kind.strength.usual, NOW, np.random.default_rng(seed)) for seed in (1, 1, 2)
     )

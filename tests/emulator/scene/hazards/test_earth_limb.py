@@ -33,7 +33,7 @@ def beside_boresight(angle_deg: float) -> np.ndarray:
     return np.asarray((np.cos(angle) * NOW.boresight + np.sin(angle) * NOW.axes[0])[None])
 
 
-def test_stars_behind_are_gone_and_no_others() -> None:
+def test_earth_hides_exactly_the_stars_behind_it() -> None:
     hazard = limb(5.0)
     hip, pixels = star_pixels(ORION, LENS, SHUTTER)
     left, _ = star_pixels(replace(ORION, hazards=(hazard,)), LENS, SHUTTER)
@@ -57,7 +57,7 @@ def test_lit_ground_has_the_radiance_of_the_mean_earth() -> None:
     assert mag == pytest.approx(2.38, abs=0.01)
 
 
-def test_whole_earth_from_far_away() -> None:
+def test_earth_light_from_far_away_matches_lambert() -> None:
     # At an angle from nadir, Lambert's ground is lit by the cosine of the way there on the sphere.
     hazard = replace(limb(0, unevenness=0.0, airglow=0.0, glow_km=0.0), altitude_km=40_000.0)
     nadir = np.array(hazard.nadir)
@@ -69,7 +69,7 @@ def test_whole_earth_from_far_away() -> None:
     assert light == pytest.approx(right, rel=0.01)
 
 
-def test_edge_is_at_the_limb() -> None:
+def test_earth_limb_light_ends_at_the_limb() -> None:
     hazard = limb(5.0, lit=True, airglow=0.0, glow_km=0.0)
     inside, outside = (hazard.glow(NOW, beside_boresight(5.0 + d))[0] for d in (0.2, -0.2))
     assert inside > 1e-3 * EARTH_RADIANCE
@@ -86,7 +86,7 @@ def test_night_side_is_dark_but_for_the_airglow() -> None:
     assert np.all(glows > 10)
 
 
-def test_airglow_straight_down_and_along_the_limb() -> None:
+def test_airglow_brightness_at_nadir_and_along_the_limb() -> None:
     height = np.array([-6378.136, 90.0, 94.0, 130.0])
     down, limb_90, limb_94, above = airglow_s10(height, np.array([True, False, False, False]))
     assert down == pytest.approx(145, rel=0.01)
@@ -96,14 +96,14 @@ def test_airglow_straight_down_and_along_the_limb() -> None:
     assert above == 0
 
 
-def test_light_in_a_lens_falls_off_beside_the_limb() -> None:
+def test_scattered_earth_light_falls_off_beside_the_limb() -> None:
     clean, dirty = limb(5.0, airglow=0.0), limb(5.0, airglow=0.0, scatter=0.01)
     near, far = (dirty.glow(NOW, beside_boresight(a))[0] for a in (0.0, -25.0))
     assert clean.glow(NOW, beside_boresight(0.0))[0] == 0
     assert near > far > 0
 
 
-def test_hides_moon_and_planets() -> None:
+def test_earth_hides_moon_and_planets() -> None:
     hazard = limb(5.0, lit=False, airglow=0.0)
     for angle_deg, shines in ((20.0, False), (-10.0, True)):
         place = tuple(beside_boresight(angle_deg)[0].tolist())
@@ -114,7 +114,7 @@ def test_hides_moon_and_planets() -> None:
         assert bool(light[y - 3 : y + 4, x - 3 : x + 4].max() > 1000) is shines
 
 
-def test_light_in_a_lens_is_the_sum_over_the_ground() -> None:
+def test_scattered_earth_light_is_the_sum_over_the_ground() -> None:
     hazard = limb(5.0, airglow=0.0, scatter=0.01)
     hazard = replace(hazard, sun=tuple((NOW.axes[1] - 0.3 * NOW.boresight).tolist()))
     generator = np.random.default_rng(6)
@@ -129,14 +129,14 @@ def test_light_in_a_lens_is_the_sum_over_the_ground() -> None:
 
 
 @pytest.mark.parametrize("angle_deg", [45.0, 5.0, 0.0, -10.0])
-def test_is_placed_with_the_limb_at_an_angle(angle_deg: float) -> None:
+def test_earth_limb_is_sampled_at_an_angle_from_the_boresight(angle_deg: float) -> None:
     hazard = EarthLimb.sample(angle_deg, NOW, np.random.default_rng(8))
     to_nadir = np.degrees(np.arccos(np.array(hazard.nadir) @ NOW.boresight))
     assert to_nadir - RADIUS_DEG == pytest.approx(angle_deg, abs=1e-6)
     assert np.array(hazard.sun) @ NOW.boresight <= 0.5 + 1e-9
 
 
-def test_light_is_looked_for_two_coarse_pixels_beyond_the_disc() -> None:
+def test_earth_ring_extends_two_coarse_pixels_beyond_the_disc() -> None:
     """Where a pixel is wider than all that shines above the limb."""
     coarse = replace(NOW, pixel_rad=np.radians(5.0))
     (ring,) = limb(5.0).rings(coarse)
@@ -145,7 +145,7 @@ def test_light_is_looked_for_two_coarse_pixels_beyond_the_disc() -> None:
 
 
 @pytest.mark.parametrize("kind", EARTH_HAZARDS.values(), ids=lambda kind: kind.name)
-def test_every_strength_makes_a_scene(kind: type[Hazard]) -> None:
+def test_every_strength_of_earth_hazards_yields_a_valid_scene(kind: type[Hazard]) -> None:
     assert kind.strength.usual in kind.strength.values
     for strength in kind.strength.values:
         hazard = kind.sample(strength, NOW, np.random.default_rng(3))
@@ -157,7 +157,7 @@ def test_every_strength_makes_a_scene(kind: type[Hazard]) -> None:
         np.testing.assert_allclose([scene.sun, scene.nadir], [again.sun, again.nadir])
 
 
-def test_clouds_have_the_share_and_the_brightness_that_they_should() -> None:
+def test_clouds_have_the_requested_cover_and_brightness() -> None:
     places = np.random.default_rng(0).standard_normal((40_000, 3)).astype(np.float32)
     places /= np.linalg.norm(places, axis=1, keepdims=True)
     shine = Clouds(cover=0.3, seed=2).shine(places)
@@ -167,14 +167,14 @@ def test_clouds_have_the_share_and_the_brightness_that_they_should() -> None:
     assert np.all(Clouds(contrast=0.0).shine(places) == 1)
 
 
-def test_the_phase_is_the_angle_of_the_sun() -> None:
+def test_terminator_phase_is_the_sun_angle() -> None:
     scene = EarthSunScene(nadir=(1, 2, 3), hazards=(Terminator(phase_deg=70.0, towards_deg=33.0),))
     assert -scene.sun @ scene.nadir == pytest.approx(np.cos(np.radians(70)))
     np.testing.assert_allclose(scene.nadir, np.array([1, 2, 3]) / np.sqrt(14))
 
 
 @pytest.mark.parametrize(("above", "visible"), [(0.5, True), (-0.5, False)])
-def test_the_limb_is_beside_the_sun(above: float, visible: bool) -> None:
+def test_earth_limb_hazard_lies_beside_the_sun(above: float, visible: bool) -> None:
     scene = EarthSunScene(hazards=(EarthInSunCamera(above_deg=above, towards_deg=80.0),))
     angle = np.degrees(np.arccos(scene.sun @ scene.nadir))
     assert angle == pytest.approx(angular_radius_deg(750) + above)

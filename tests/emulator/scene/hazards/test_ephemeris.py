@@ -25,7 +25,7 @@ def arcmin(a: np.ndarray, b: np.ndarray) -> float:
         ("neptune", 359.74490, -1.56296, 30.05850, 5),
     ],
 )
-def test_planets_are_where_another_theory_has_them(
+def test_planet_positions_match_another_theory(
     planet: str, ra_deg: float, dec_deg: float, distance_au: float, within_arcmin: float
 ) -> None:
     place = ephemeris.geocentric(planet, DATE)
@@ -33,27 +33,27 @@ def test_planets_are_where_another_theory_has_them(
     assert np.linalg.norm(place) == pytest.approx(distance_au, rel=1e-3)
 
 
-def test_great_conjunction_of_2020() -> None:
+def test_ephemeris_places_jupiter_and_saturn_6_arcmin_apart_in_2020() -> None:
     # 2020-12-21 18:20 UT: Jupiter and Saturn 6.1 arcmin apart.
     date = 2459205.264
     apart = arcmin(ephemeris.geocentric("jupiter", date), ephemeris.geocentric("saturn", date))
     assert apart == pytest.approx(6.1, abs=2)
 
 
-def test_transit_of_venus_in_2012() -> None:
+def test_ephemeris_places_venus_9_arcmin_from_the_sun_in_its_transit() -> None:
     # 2012-06-06 01:30 UT: 9.2 arcmin from the Sun's centre.
     date = 2456084.5625
     sun = -ephemeris.heliocentric("earth", date)
     assert arcmin(ephemeris.geocentric("venus", date), sun) == pytest.approx(9.2, abs=0.3)
 
 
-def test_sun_at_the_equinox() -> None:
+def test_sun_longitude_is_0_at_the_equinox() -> None:
     # 2026-03-20 14:46 UT it is at 0 deg of date: 26.2 years of precession before that of J2000.
     longitude = ephemeris.sun_longitude_deg(2461120.1153)
     assert (longitude + 26.21 * 50.29 / 3600 + 180) % 360 - 180 == pytest.approx(0, abs=0.01)
 
 
-def test_velocity_of_the_earth() -> None:
+def test_earth_velocity_matches_published_values() -> None:
     # Perihelion and aphelion speeds: 30.29 and 29.29 km/s.
     velocities = [ephemeris.earth_velocity_km_s(date) for date in (2461044.2, 2461228.2)]
     assert np.linalg.norm(velocities, axis=1) == pytest.approx([30.29, 29.29], abs=0.02)
@@ -76,7 +76,7 @@ neptune 45 27.44139 -10.91034 -5.14855 -29.09373 -8.04979 -2.57073 19.40787 21.1
 
 
 @pytest.mark.parametrize("line", PLACES.splitlines(), ids=lambda line: line.split()[0])
-def test_two_centuries_of_places(line: str) -> None:
+def test_planet_positions_are_accurate_over_two_centuries(line: str) -> None:
     planet, within_arcsec, *places = line.split()
     there = np.reshape([float(number) for number in places], (3, 3))
     dates = (2396758.5, 2433282.5, 2469000.5)
@@ -89,14 +89,16 @@ def test_two_centuries_of_places(line: str) -> None:
     ("planet", "perihelion_deg", "node_deg"),
     [("jupiter", 14.3313, 100.4644), ("saturn", 93.0568, 113.6655)],
 )
-def test_giants_are_near_mean_elements(planet: str, perihelion_deg: float, node_deg: float) -> None:
+def test_giant_planet_elements_are_near_published_mean_elements(
+    planet: str, perihelion_deg: float, node_deg: float
+) -> None:
     """Meeus, Astronomical Algorithms, table 31.A: J2000; these are fitted to two centuries."""
     *_, perihelion, node = ephemeris.ELEMENTS[planet][0]
     assert perihelion == pytest.approx(perihelion_deg, abs=0.5)
     assert node == pytest.approx(node_deg, abs=0.05)
 
 
-def test_an_ellipse_obeys_kepler() -> None:
+def test_elliptical_orbit_obeys_keplers_laws() -> None:
     """Equal areas in equal times, the focus in the Sun, whatever the eccentricity."""
     for planet in ephemeris.ELEMENTS:
         axis, eccentricity = ephemeris.ELEMENTS[planet][0][:2]

@@ -23,7 +23,7 @@ def grid(half_deg: float, step_deg: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_a_ghost_lies_on_the_line_through_axis_and_sun(seed: int) -> None:
+def test_ghost_lies_on_the_line_through_optical_axis_and_sun(seed: int) -> None:
     sun = vector_from_angles(30, 40)
     ghost = Ghosts(sun=tuple(sun), count=1, scatter=0.0, seed=seed, share=1e-4)
     angles, vectors = grid(70, 0.2)
@@ -37,14 +37,14 @@ def test_a_ghost_lies_on_the_line_through_axis_and_sun(seed: int) -> None:
     assert (glow * solid).sum() == pytest.approx(1e-4 * 10 ** (-0.4 * SUN_V), rel=0.05)
 
 
-def test_a_sun_outside_of_the_field_makes_none() -> None:
+def test_sun_outside_the_field_creates_no_ghosts() -> None:
     _, vectors = grid(80, 4)
     assert not Ghosts(sun=tuple(vector_from_angles(96, 0))).glow(FISHEYE, vectors).any()
     assert not Ghosts().glow(FISHEYE, vectors).any()
     assert Ghosts(sun=tuple(vector_from_angles(94, 0))).glow(FISHEYE, vectors).any()
 
 
-def test_a_map_has_the_sun_whose_ghosts_they_are() -> None:
+def test_sky_map_shows_the_sun_of_lens_ghosts() -> None:
     sun = vector_from_angles(30, 40)
     (body,) = bodies_of((Ghosts(), Ghosts(sun=tuple(3 * sun))))
     assert (body.name, body.radius_deg) == ("Sun", pytest.approx(0.27, abs=0.01))
@@ -53,7 +53,7 @@ def test_a_map_has_the_sun_whose_ghosts_they_are() -> None:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_glint_is_at_the_border_and_turns_with_the_camera(seed: int) -> None:
+def test_glint_is_near_the_border_and_fixed_to_the_camera(seed: int) -> None:
     angles, vectors = grid(100, 0.5)
     glow = Glint(seed=seed, surface=0.04).glow(FISHEYE, vectors)
     assert glow.max() == pytest.approx(0.04 * SUN_SURFACE)
@@ -66,7 +66,7 @@ def test_glint_is_at_the_border_and_turns_with_the_camera(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_ghosts_halve_from_one_to_the_next_and_lie_within_their_rings(seed: int) -> None:
+def test_each_ghost_has_half_the_light_of_the_last_within_its_ring(seed: int) -> None:
     sun = tuple(vector_from_angles(-20, 35))
     _, vectors = grid(60, 0.6)
     rays = np.concatenate([vectors, [sun]])
@@ -90,7 +90,7 @@ def test_ghosts_halve_from_one_to_the_next_and_lie_within_their_rings(seed: int)
         np.testing.assert_allclose(ghosts.glow(FISHEYE, rays), expected, rtol=2e-3, atol=1e3)
 
 
-def test_ghosts_scatter_the_suns_light_as_glare_does() -> None:
+def test_ghost_scatter_follows_the_glare_model() -> None:
     sun = vector_from_angles(5, 0)
     _, vectors = grid(30, 1)
     glare = Ghosts(sun=tuple(sun), count=0, scatter=0.02).glow(FISHEYE, vectors)
@@ -100,7 +100,7 @@ def test_ghosts_scatter_the_suns_light_as_glare_does() -> None:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_glint_is_of_bars_with_sizes_by_the_half_field(seed: int) -> None:
+def test_glint_bar_size_scales_with_the_half_field(seed: int) -> None:
     """A bar's light is its area's; from its ring comes its diagonal."""
     (ring,) = Glint(seed=seed, count=1).rings(FISHEYE)
     away_deg = np.degrees(np.arccos(ring.centre[2]))
@@ -134,7 +134,7 @@ def test_glint_is_of_bars_with_sizes_by_the_half_field(seed: int) -> None:
     assert ((soft > 0.05) & (soft < 0.95)).sum() > ((share > 0.05) & (share < 0.95)).sum()
 
 
-def test_glint_is_on_any_side_alike() -> None:
+def test_glints_are_uniform_around_the_axis() -> None:
     bars = (Glint(seed=seed, count=50).rings(FISHEYE) for seed in range(20))
     centres = [ring.centre for rings in bars for ring in rings]
     across = np.array(centres)[:, :2]
@@ -152,7 +152,7 @@ def on_boresight(hazard: SunGlare) -> float:
     return float(hazard.glow(NOW, NOW.boresight[None])[0])
 
 
-def test_transmittance_is_that_at_45_deg_and_falls_by_decades() -> None:
+def test_glare_transmittance_is_defined_at_45_deg_and_falls_by_decades() -> None:
     sun = 10 ** (-0.4 * SUN_V)
     assert on_boresight(at(45, transmittance=3e-7)) == pytest.approx(3e-7 * sun, rel=1e-5)
     assert on_boresight(at(75, transmittance=3e-7)) == pytest.approx(3e-9 * sun, rel=1e-5)
@@ -160,7 +160,7 @@ def test_transmittance_is_that_at_45_deg_and_falls_by_decades() -> None:
     assert on_boresight(moon) == pytest.approx(3e-7 * sun * 10**-5.6, rel=1e-4)
 
 
-def test_slope_across_the_picture() -> None:
+def test_sun_glare_slope_across_the_image_is_exponential() -> None:
     scene = SkyScene(ORION.quaternion, mag_limit=-2, hazards=(at(60, slope_deg=20.0),))
     light = star_light(scene, LENS, SHUTTER)
     row = light[256] / light[256, 512]
@@ -171,7 +171,7 @@ def test_slope_across_the_picture() -> None:
     assert solid == pytest.approx(np.exp((away_deg[0] - away_deg[1]) / 20), rel=0.15)
 
 
-def test_sun_in_the_field_is_finite() -> None:
+def test_sun_in_the_field_yields_finite_light() -> None:
     light = star_light(SkyScene(ORION.quaternion, hazards=(at(0, transmittance=1),)), LENS, SHUTTER)
     assert np.isfinite(light).all()
     # No baffle gives more than there is.

@@ -29,7 +29,7 @@ def moon_at_phase(phase_deg: float) -> Moon:
     ("phase_deg", "v_mag"),
     [(0, -12.73), (90, -10.13), (150, -6.81)],  # Allen's formula, worked by hand
 )
-def test_disc_holds_its_magnitude(phase_deg: float, v_mag: float) -> None:
+def test_moon_disc_light_adds_up_to_its_magnitude(phase_deg: float, v_mag: float) -> None:
     moon = moon_at_phase(phase_deg)
     assert moon.phase_deg == pytest.approx(phase_deg, abs=1e-6)
     assert moon.v_mag == pytest.approx(v_mag, abs=0.01)
@@ -37,7 +37,7 @@ def test_disc_holds_its_magnitude(phase_deg: float, v_mag: float) -> None:
     assert -2.5 * math.log10(whole) == pytest.approx(v_mag, abs=0.02)
 
 
-def test_picture_holds_its_electrons() -> None:
+def test_moon_image_holds_its_electrons() -> None:
     moon = moon_at_phase(90)
     dark = SkyScene(ORION.quaternion, mag_limit=-2, hazards=(moon,))
     light = star_light(dark, LENS, SHUTTER)
@@ -53,7 +53,7 @@ def test_lit_side_is_towards_the_sun() -> None:
     assert dark == 0
 
 
-def test_full_moon_is_even_and_3_4_mag_an_arcsec2() -> None:
+def test_full_moon_is_uniform_with_3_4_mag_per_arcsec2() -> None:
     centre = NOW.boresight[None]
     edge = NOW.boresight + 0.7 * RADIUS_RAD * NOW.axes[1]
     full = Moon(direction=CENTRE, scatter=0.0)
@@ -63,13 +63,13 @@ def test_full_moon_is_even_and_3_4_mag_an_arcsec2() -> None:
     assert -2.5 * math.log10(middle / 4.2545e10) == pytest.approx(3.36, abs=0.02)
 
 
-def test_scatters_the_declared_share() -> None:
+def test_aureole_contains_the_declared_share_of_light() -> None:
     angles = np.linspace(0, math.radians(44.9), 100_001)
     share = np.trapezoid(aureole(angles, 0.1) * 2 * math.pi * np.sin(angles), angles)
     assert share == pytest.approx(0.1, rel=0.1)
 
 
-def test_hides_the_stars_behind() -> None:
+def test_moon_hides_the_stars_behind() -> None:
     hip, pixels = star_pixels(ORION, LENS, SHUTTER)
     behind = int(np.argmin(np.hypot(*(pixels - [512, 256]).T)))
     vector = LENS.unproject(pixels[behind][None])[0] @ NOW.axes
@@ -79,7 +79,7 @@ def test_hides_the_stars_behind() -> None:
     assert len(left) > len(hip) - 20
 
 
-def test_is_placed_in_the_picture_with_its_phase() -> None:
+def test_moon_is_sampled_inside_the_image_with_its_phase() -> None:
     generator = np.random.default_rng(3)
     for share in (0.0, 0.2, 1.0):
         moon = Moon.sample(share, NOW, generator)
@@ -101,12 +101,12 @@ def test_is_placed_in_the_picture_with_its_phase() -> None:
         (2461041.5, "neptune", 7.9),
     ],
 )
-def test_magnitudes_of_almanacs(date: float, planet: str, v_mag: float) -> None:
+def test_planet_magnitudes_match_almanacs(date: float, planet: str, v_mag: float) -> None:
     lights = Planets(julian_date=date).lights(NOW)
     assert lights.v_mag[list(MAGNITUDES).index(planet)] == pytest.approx(v_mag, abs=0.06)
 
 
-def test_all_are_near_the_ecliptic() -> None:
+def test_planets_are_within_9_deg_of_the_ecliptic() -> None:
     lights = Planets().lights(NOW)
     pole = np.array([0, -np.sin(np.radians(23.44)), np.cos(np.radians(23.44))])
     assert len(lights.vectors) == 7
@@ -114,7 +114,7 @@ def test_all_are_near_the_ecliptic() -> None:
     np.testing.assert_allclose(np.linalg.norm(lights.vectors, axis=1), 1)
 
 
-def test_one_shines_as_a_star_of_its_magnitude() -> None:
+def test_planet_has_the_light_of_a_star_of_its_magnitude() -> None:
     planet = Planets.sample(-2.0, NOW, np.random.default_rng(1))
     dark = SkyScene(ORION.quaternion, mag_limit=-2.0)
     light = star_light(SkyScene(ORION.quaternion, mag_limit=-2.0, hazards=(planet,)), LENS, SHUTTER)
@@ -145,7 +145,7 @@ def test_streak_holds_the_light_of_a_star(rate_deg_s: float) -> None:
     assert light.sum(dtype=np.float64) == pytest.approx(right, rel=2e-3)
 
 
-def test_streak_is_as_long_as_it_moves() -> None:
+def test_debris_streak_length_follows_its_motion() -> None:
     light, hazard = streak(3.0)
     columns = np.arange(LENS.columns)
     across = light.sum(axis=0, dtype=np.float64)
@@ -163,7 +163,7 @@ def test_streak_is_as_long_as_it_moves() -> None:
     assert spread == pytest.approx(np.hypot(abs(last - first) / np.sqrt(12), 0.95), rel=0.02)
 
 
-def test_stars_are_unchanged() -> None:
+def test_debris_does_not_change_stars_elsewhere() -> None:
     _, hazard = streak(1.0)
     clean = star_light(ORION, LENS, SHUTTER)
     light = star_light(replace(ORION, hazards=(hazard,)), LENS, SHUTTER)
@@ -189,7 +189,7 @@ def test_aberration_is_20_8_arcsec_and_5_more_with_the_orbit() -> None:
     assert shifts_arcsec(ahead).max() == pytest.approx(20.8 + 5.2, abs=0.1)
 
 
-def test_goes_towards_the_velocity_as_relativity_says() -> None:
+def test_aberration_follows_the_relativistic_formula() -> None:
     speed = 0.01
     hazard = Aberration(velocity_km_s=(0.0, 0.0, speed * 299_792.458))
     moved = hazard.apparent(NOW, VECTORS)
@@ -198,7 +198,7 @@ def test_goes_towards_the_velocity_as_relativity_says() -> None:
     np.testing.assert_allclose(np.linalg.norm(moved, axis=1), 1)
 
 
-def test_moves_stars_in_the_picture() -> None:
+def test_aberration_shifts_stars_in_the_image() -> None:
     velocity = 38 * NOW.axes[0]
     hazard = Aberration(velocity_km_s=tuple(velocity.tolist()))
     hip, before = star_pixels(ORION, LENS, SHUTTER)
@@ -228,6 +228,6 @@ def test_moves_stars_in_the_picture() -> None:
         ),
     ],
 )
-def test_rejects_impossible_values(kind: type, values: dict, message: str) -> None:
+def test_moon_rejects_invalid_directions(kind: type, values: dict, message: str) -> None:
     with pytest.raises(SceneError, match=message):
         kind(**values)

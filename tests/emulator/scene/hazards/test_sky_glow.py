@@ -39,7 +39,7 @@ def test_ecliptic_pole_is_60_s10_or_v_23_3() -> None:
     assert mag_arcsec2(sky_glow.SkyGlow(milky_way=0), pole) == pytest.approx(23.3, abs=0.05)
 
 
-def test_zodiacal_light_by_the_other_table() -> None:
+def test_zodiacal_light_matches_the_second_published_table() -> None:
     """Both tables are rounded, to three digits at most."""
     s10 = np.array([line.replace("-", "nan").split() for line in TABLE_16.splitlines()], float)
     s10 = np.column_stack([s10, np.full(len(s10), 60)])  # the pole's, which is not in the table
@@ -57,7 +57,7 @@ def test_zodiacal_light_has_no_steps() -> None:
         assert np.abs(np.diff(np.log(light))).max() < 0.01
 
 
-def test_is_brighter_towards_the_sun_of_the_date() -> None:
+def test_zodiacal_light_is_brighter_towards_the_sun() -> None:
     hazard = sky_glow.SkyGlow(milky_way=0, julian_date=ephemeris.NEW_YEAR_2026)
     sun = -ephemeris.heliocentric("earth", ephemeris.NEW_YEAR_2026)
     sun /= np.linalg.norm(sun)
@@ -77,7 +77,7 @@ def test_milky_way_is_a_band_and_as_bright_as_published() -> None:
 
 
 @pytest.mark.parametrize("away_deg", [15.0, 60.0, 180.0])
-def test_is_placed_at_a_longitude_from_the_sun(away_deg: float) -> None:
+def test_sky_glow_is_sampled_at_a_longitude_from_the_sun(away_deg: float) -> None:
     for seed in range(4):
         hazard = sky_glow.SkyGlow.sample(away_deg, NOW, np.random.default_rng(seed))
         x, y, _ = NOW.boresight @ ephemeris.FROM_ECLIPTIC

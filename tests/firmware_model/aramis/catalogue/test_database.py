@@ -35,7 +35,7 @@ def place(image: bytes, wanted: str) -> int:
     return sum(list(parts.values())[: list(parts).index(wanted)])
 
 
-def test_unpacking_restores_what_was_packed(image: bytes) -> None:
+def test_database_round_trips_through_its_image(image: bytes) -> None:
     first, second = database(SMALL), Database.unpack(image)
     assert sum(first.sizes.values()) == len(image)
     for name in ("numbers", "vectors", "v_mag", "stars", "faces", "areas", "moments"):
@@ -48,11 +48,11 @@ def test_unpacking_restores_what_was_packed(image: bytes) -> None:
     assert second.pack() == image
 
 
-def test_memory_is_as_good_as_bytes(image: bytes) -> None:
+def test_database_unpacks_from_a_memoryview(image: bytes) -> None:
     assert Database.unpack(memoryview(bytearray(image))).pack() == image
 
 
-def test_the_published_database_takes_6_megabytes() -> None:
+def test_published_database_takes_6_megabytes() -> None:
     assert sum(database().sizes.values()) == pytest.approx(5.9e6, rel=0.02)
 
 
@@ -81,7 +81,9 @@ def test_detects_any_flipped_bit(image: bytes, seed: int) -> None:
         ("vectors", struct.pack("<f", float("nan")), "vectors of the image are not all finite"),
     ],
 )
-def test_rejects_misleading_contents(image: bytes, name: str, value: bytes, words: str) -> None:
+def test_database_rejects_inconsistent_contents(
+    image: bytes, name: str, value: bytes, words: str
+) -> None:
     with pytest.raises(DatabaseError, match=words):
         Database.unpack(changed(image, place(image, name), value))
 
@@ -108,7 +110,7 @@ def directions(count: int, seed: int = 0) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("splits", "faces"), [(0, 20), (1, 80), (2, 320)])
-def test_each_split_makes_four_of_one(splits: int, faces: int) -> None:
+def test_geodesic_split_turns_each_face_into_four(splits: int, faces: int) -> None:
     assert len(geodesic_sphere(splits)) == faces
 
 
@@ -118,7 +120,7 @@ def test_rejects_splits_out_of_range(splits: int) -> None:
         geodesic_sphere(splits)
 
 
-def test_faces_come_in_opposite_pairs() -> None:
+def test_geodesic_faces_come_in_opposite_pairs() -> None:
     opposite = CENTRES @ -CENTRES.T
     np.testing.assert_allclose(opposite.max(axis=1), 1, atol=1e-6)
 
@@ -130,14 +132,14 @@ def test_centres_are_spread_evenly() -> None:
     assert 0.7 < share.min() < share.max() < 1.4
 
 
-def test_sixty_faces_at_the_twelve_corners_have_eleven_neighbours() -> None:
+def test_geodesic_faces_have_12_neighbours_but_11_at_the_corners() -> None:
     assert SPHERE.neighbours.shape == (320, 12)
     counts = (SPHERE.neighbours != NO_FACE).sum(axis=1)
     assert sorted(set(counts.tolist())) == [11, 12]
     assert (counts == 11).sum() == 12 * 5
 
 
-def test_neighbours_are_mutual_near_and_no_face_is_its_own() -> None:
+def test_geodesic_neighbours_are_mutual_and_nearest() -> None:
     for face, row in enumerate(SPHERE.neighbours):
         others = row[row != NO_FACE]
         assert face not in others
@@ -155,7 +157,7 @@ def test_a_direction_lies_in_the_face_with_the_nearest_centre() -> None:
     assert spent.counts["f32_mul"] == 200 * 3 * 320
 
 
-def test_the_faces_around_hold_every_direction_within_half_a_field() -> None:
+def test_faces_around_a_boresight_cover_half_a_field() -> None:
     """What section 5.9 asks of the size of the faces: half a field of 21.5 deg from a boresight
     anywhere in the face."""
     rng = np.random.default_rng(2)
@@ -189,7 +191,9 @@ floats = st.floats(-1e6, 1e6, width=32)
 @example([7.0] * 50, 7.0, 7.0, 4)
 @given(st.lists(floats, min_size=1, max_size=200), floats, floats, st.integers(1, 30))
 @settings(max_examples=300, deadline=None)
-def test_any_list_and_any_range(values: list[float], a: float, b: float, per_bin: int) -> None:
+def test_k_vector_range_search_equals_brute_force(
+    values: list[float], a: float, b: float, per_bin: int
+) -> None:
     rising = np.sort(np.array(values, dtype=np.float32))
     low, high = np.float32(min(a, b)), np.float32(max(a, b))
     assert found(rising, float(low), float(high), per_bin) == brute_force(rising, low, high)
@@ -197,7 +201,9 @@ def test_any_list_and_any_range(values: list[float], a: float, b: float, per_bin
 
 @given(st.lists(floats, min_size=1, max_size=60), st.data())
 @settings(max_examples=200, deadline=None)
-def test_bounds_that_are_values_themselves_count(values: list[float], data: st.DataObject) -> None:
+def test_k_vector_range_includes_bounds_equal_to_values(
+    values: list[float], data: st.DataObject
+) -> None:
     rising = np.sort(np.array(values, dtype=np.float32))
     value = st.sampled_from(rising.tolist())
     low, high = sorted((data.draw(value), data.draw(value)))
@@ -205,7 +211,7 @@ def test_bounds_that_are_values_themselves_count(values: list[float], data: st.D
 
 
 @pytest.mark.parametrize("name", ["area", "moment"])
-def test_the_real_lists_against_brute_force(name: str) -> None:
+def test_k_vector_search_of_the_real_lists_equals_brute_force(name: str) -> None:
     onboard, rng = database(), np.random.default_rng(4)
     rising, vector = getattr(onboard, f"{name}s"), getattr(onboard, f"{name}_index")
     looked_at = []
@@ -224,11 +230,11 @@ def test_the_real_lists_against_brute_force(name: str) -> None:
 @pytest.mark.parametrize(
     ("low", "high"), [(2.0, 1.0), (5.0, 6.0), (-2.0, -1.0), (np.nan, 1.0), (0.0, np.nan)]
 )
-def test_empty_ranges(low: float, high: float) -> None:
+def test_k_vector_search_of_an_empty_range_finds_nothing(low: float, high: float) -> None:
     assert found(np.array([0, 1, 2, 3], dtype=np.float32), low, high) == []
 
 
-def test_each_comparison_is_charged() -> None:
+def test_k_vector_search_charges_each_comparison() -> None:
     rising = np.arange(1000, dtype=np.float32)
     vector = KVector.build(rising, 10)
     spent = meter()

@@ -40,7 +40,7 @@ def desk() -> Desk:
     return Desk()
 
 
-def test_what_was_written_is_loaded(desk: Desk) -> None:
+def test_catalogue_is_loaded_as_written(desk: Desk) -> None:
     store = desk.store
     assert desk.load()
     assert store.state is CatalogueState.GOOD
@@ -49,7 +49,7 @@ def test_what_was_written_is_loaded(desk: Desk) -> None:
     assert store.length == len(desk.image)
 
 
-def test_loading_takes_the_flash_s_time_and_a_little_more(desk: Desk) -> None:
+def test_catalogue_load_takes_less_than_twice_the_flash_read_time(desk: Desk) -> None:
     desk.load()
     flash_us = len(desk.coded) / 2 * 0.070
     assert flash_us < desk.store.load_us < 2 * flash_us
@@ -69,7 +69,7 @@ def test_single_errors_all_over_the_flash_are_corrected(desk: Desk) -> None:
 
 
 @pytest.mark.parametrize("word", [0, 1, 5000, -1])
-def test_a_double_error_is_detected_wherever_it_is(desk: Desk, word: int) -> None:
+def test_two_flipped_bits_in_a_word_fail_the_catalogue_load(desk: Desk, word: int) -> None:
     word %= len(desk.coded) // 9
     desk.flip_flash(72 * word + 3, 72 * word + 40)
     assert not desk.load()
@@ -77,7 +77,7 @@ def test_a_double_error_is_detected_wherever_it_is(desk: Desk, word: int) -> Non
     assert (desk.store.length, desk.store.lost, desk.store.failures) == (0, 1, 1)
 
 
-def test_three_errors_that_look_like_one_do_not_pass_the_checksum(desk: Desk) -> None:
+def test_checksum_detects_three_errors_miscorrected_as_one(desk: Desk) -> None:
     rng = np.random.default_rng(5)
     for _ in range(200):  # until a triple is taken for a single error
         bits = 72 * 700 + rng.choice(72, 3, replace=False)
@@ -91,7 +91,7 @@ def test_three_errors_that_look_like_one_do_not_pass_the_checksum(desk: Desk) ->
         pytest.fail("no triple error was miscorrected")
 
 
-def test_an_erased_flash_holds_no_catalogue(desk: Desk) -> None:
+def test_erased_flash_holds_no_catalogue(desk: Desk) -> None:
     for content in (0xFF, 0):
         desk.unit.catalogue_flash[:] = content
         assert not desk.load()
@@ -111,7 +111,7 @@ def test_rejects_catalogue_larger_than_flash() -> None:
         flash_image(bytes(MOST_CATALOGUE_BYTES + 1))
 
 
-def test_damaged_ram_is_noticed_before_use_and_loaded_anew(desk: Desk) -> None:
+def test_damaged_catalogue_in_ram_is_detected_and_reloaded(desk: Desk) -> None:
     desk.load()
     assert desk.unit.perform(desk.store.ensure())
     assert desk.store.loads == 1
@@ -123,7 +123,7 @@ def test_damaged_ram_is_noticed_before_use_and_loaded_anew(desk: Desk) -> None:
         assert desk.ram.tobytes() == desk.image
 
 
-def test_damaged_ram_and_flash_leave_no_catalogue(desk: Desk) -> None:
+def test_damage_in_ram_and_flash_leaves_no_catalogue(desk: Desk) -> None:
     desk.load()
     desk.ram[77] ^= 1
     desk.flip_flash(72 * 300, 72 * 300 + 1)
@@ -144,7 +144,7 @@ def test_failed_reload_keeps_the_good_copy(desk: Desk) -> None:
     assert desk.ram.tobytes() == desk.image
 
 
-def test_a_pass_comes_in_slices_of_a_few_milliseconds(desk: Desk) -> None:
+def test_catalogue_load_steps_take_less_than_5_ms(desk: Desk) -> None:
     ended, times_us = False, [desk.unit.now_us]
     while not ended:
         ended = desk.unit.perform(desk.store.load_step())
@@ -207,7 +207,7 @@ def flipped(coded: np.ndarray, *bits: int) -> np.ndarray:
     return damaged
 
 
-def test_columns_are_distinct_odd_and_none_is_a_check_bit_s() -> None:
+def test_hamming_columns_are_distinct_with_odd_weight_above_1() -> None:
     columns = hamming._columns()
     assert len(set(columns)) == 64
     assert all(column.bit_count() % 2 == 1 and column.bit_count() > 1 for column in columns)
@@ -243,7 +243,7 @@ def test_each_double_error_is_detected(data: bytes) -> None:
     assert decoded.lost.tolist() == list(range(len(pairs)))
 
 
-def test_the_code_is_linear() -> None:
+def test_hamming_code_is_linear() -> None:
     """The check byte of a sum is the sum of the check bytes: an oracle for the tables."""
     rng = np.random.default_rng(1)
     one, two = rng.bytes(8), rng.bytes(8)
@@ -253,7 +253,7 @@ def test_the_code_is_linear() -> None:
     assert single[8] == hamming._columns()[5]
 
 
-def test_the_cost_is_that_of_the_words_read() -> None:
+def test_flash_decoding_cost_is_proportional_to_the_words_read() -> None:
     counter = meter()
     decode(encode(bytes(800)), counter)
     assert counter.counts["coded_word"] == 100

@@ -46,7 +46,7 @@ def test_centroids_are_weighted_means(seed: int, floor: int) -> None:
     np.testing.assert_allclose(found.centroids, middle[order][:, ::-1], atol=1e-4)
 
 
-def test_sizes_out_of_range_are_no_stars() -> None:
+def test_regions_of_size_out_of_range_are_not_stars() -> None:
     mask = np.zeros((20, 20), dtype=bool)
     mask[2, 2] = mask[5:8, 5:8] = mask[12:18, 10:18] = True
     picture = np.full((20, 20), 100, dtype=np.uint8)
@@ -63,19 +63,19 @@ def test_a_gaussian_spot_is_found_to_a_hundredth_of_a_pixel() -> None:
         np.testing.assert_allclose(found.centroids, [[centre_x, centre_y]], atol=0.01)
 
 
-def test_nothing() -> None:
+def test_regions_without_light_yield_no_stars() -> None:
     picture = np.zeros((8, 8), dtype=np.uint8)
     assert len(stars(picture, picture > 0)) == 0
     assert len(stars(picture, picture == 0)) == 0  # lit, but without weight
 
 
-def test_the_whole_picture_is_one_region() -> None:
+def test_white_image_is_one_region() -> None:
     picture = np.full((1024, 1280), 255, dtype=np.uint8)
     found = stars(picture, picture > 0, max_pixels=1280 * 1024)
     np.testing.assert_allclose(found.centroids, [[639.5, 511.5]], atol=1e-3)
 
 
-def test_gives_up_on_too_many_runs() -> None:
+def test_find_regions_returns_none_for_too_many_runs() -> None:
     chequered = (np.indices((256, 256)).sum(axis=0) % 2).astype(bool)
     assert chequered.sum() > MOST_RUNS
     assert find_regions(chequered) is None
@@ -97,7 +97,7 @@ def after(*pictures: np.ndarray, field: CameraField = FLAT) -> LevelHistory:
     return background
 
 
-def test_mean_plus_two_sigma_of_all_pixels() -> None:
+def test_background_threshold_is_mean_plus_sigmas_of_all_pixels() -> None:
     pictures = [noise(20, 3, seed) for seed in range(FRAMES)]
     background = after(*pictures)
     pixels = np.stack(pictures)
@@ -106,7 +106,7 @@ def test_mean_plus_two_sigma_of_all_pixels() -> None:
     assert background.threshold(0, meter()) == int(pixels.mean())
 
 
-def test_only_the_last_five_count() -> None:
+def test_background_uses_only_the_last_five_images() -> None:
     levels = (200, 200, 10, 10, 10, 10, 10)
     background = after(*(np.full((48, 64), level, dtype=np.uint8) for level in levels))
     assert len(background.sums) == FRAMES
@@ -118,16 +118,16 @@ def test_background_works_with_fewer_images() -> None:
     assert after(noise(50, 5, 1)).threshold(2, meter()) == pytest.approx(60, abs=1)
 
 
-def test_a_change_of_level_is_followed_slowly() -> None:
+def test_background_mean_follows_a_step_slowly() -> None:
     assert after(*[noise(20, 2, 1)] * 4, noise(40, 2, 2)).mean(meter()) == 24
 
 
-def test_what_is_outside_the_field_does_not_count() -> None:
+def test_background_ignores_pixels_outside_the_field() -> None:
     background = after(np.where(ROUND.mask, 30, 255).astype(np.uint8), field=ROUND)
     assert background.mean(meter()) == background.threshold(5, meter()) == 30
 
 
-def test_the_largest_sums() -> None:
+def test_background_sums_of_white_images_do_not_overflow() -> None:
     """All white at full size: the squares of five pictures exceed 32 bits."""
     white = np.full((1024, 1280), 255, dtype=np.uint8)
     background = after(*[white] * FRAMES, field=CameraField(round=False))
@@ -164,14 +164,16 @@ def slowly(mask: Mask, method: SpikeRemoval, needed: int) -> Mask:
 @pytest.mark.parametrize("method", [SpikeRemoval.CENTRE, SpikeRemoval.WINDOW])
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("needed", [1, 8, HALF, 25])
-def test_each_window_by_itself(method: SpikeRemoval, shape: tuple[int, int], needed: int) -> None:
+def test_spike_filter_equals_a_window_by_window_reference(
+    method: SpikeRemoval, shape: tuple[int, int], needed: int
+) -> None:
     for seed in range(5):
         mask = np.random.default_rng(seed).random(shape) < 0.5
         np.testing.assert_array_equal(run(mask, method, needed), slowly(mask, method, needed))
 
 
 @pytest.mark.parametrize("method", [SpikeRemoval.CENTRE, SpikeRemoval.WINDOW])
-def test_spikes_go_and_stars_stay(method: SpikeRemoval) -> None:
+def test_spike_removal_keeps_stars(method: SpikeRemoval) -> None:
     spikes = np.random.default_rng(1).random((100, 100)) < 0.05
     assert not run(spikes, method).any()
     star = np.zeros((100, 100), dtype=bool)
@@ -179,7 +181,7 @@ def test_spikes_go_and_stars_stay(method: SpikeRemoval) -> None:
     assert run(spikes | star, method)[40:50, 40:50].sum() > 90
 
 
-def test_a_window_of_thirteen_stays_and_one_of_twelve_goes() -> None:
+def test_spike_filter_keeps_13_pixels_of_a_window_and_removes_12() -> None:
     mask = np.zeros((15, 15), dtype=bool)
     mask[5:10, 5:10].flat[:13] = True
     assert run(mask, SpikeRemoval.WINDOW).sum() == 13
@@ -192,7 +194,7 @@ def test_filter_off_leaves_the_image_unchanged() -> None:
     assert run(mask, SpikeRemoval.OFF) is mask
 
 
-def test_the_second_method_is_the_quicker_one() -> None:
+def test_window_spike_method_is_the_cheaper_one() -> None:
     first, second = meter(), meter()
     charge_spikes((100, 100), SpikeRemoval.CENTRE, 0, first)
     charge_spikes((100, 100), SpikeRemoval.WINDOW, 0, second)

@@ -59,7 +59,7 @@ def apart(stars: StarList, places: NDArray[np.float64]) -> NDArray[np.float64]:
 
 @pytest.mark.parametrize("sigma", [1.5, 3.0, 5.0])
 @pytest.mark.parametrize("light", [1500.0, 8000.0])
-def test_errors_are_what_is_claimed(light: float, sigma: float) -> None:
+def test_centroid_errors_match_the_reported_sigma(light: float, sigma: float) -> None:
     places = grid(50, 1)
     stars = found(spots(places, light, sigma, level=20.0))
     assert len(stars) >= (20 if (light, sigma) == (1500.0, 5.0) else 49)
@@ -70,14 +70,14 @@ def test_errors_are_what_is_claimed(light: float, sigma: float) -> None:
 
 
 @pytest.mark.parametrize("slope", [0.02, 0.06])
-def test_a_gradient_moves_no_centroid(slope: float) -> None:
+def test_background_gradient_shifts_no_centroid(slope: float) -> None:
     places = grid(40, 2)
     stars = found(spots(places, 4000.0, level=10 + slope * X))
     assert len(stars) == 40
     assert np.abs(apart(stars, places).mean(axis=0)).max() < 0.03
 
 
-def test_an_edge_is_no_star_and_hides_none() -> None:
+def test_brightness_edge_creates_no_star_and_hides_none() -> None:
     """Half of the picture full, the edge fading over some pixels, askew."""
     along = 0.8 * X + 0.6 * Y - 800
     level = 6 + 400 / (1 + np.exp(along / 4))
@@ -90,7 +90,7 @@ def test_an_edge_is_no_star_and_hides_none() -> None:
     assert stars.light.saturated > 0.2
 
 
-def test_hot_pixels_are_no_stars_and_move_none() -> None:
+def test_hot_pixels_add_no_stars_and_shift_none() -> None:
     places = grid(50, 4)
     image = spots(places, 4000.0)
     hot = np.random.default_rng(5).choice(image.size, 20_000, replace=False)
@@ -103,7 +103,7 @@ def test_hot_pixels_are_no_stars_and_move_none() -> None:
     assert stars.light.spikes == pytest.approx(20_000 * FIELD.pixels / image.size, rel=0.1)
 
 
-def test_a_disc_counts_once_at_most() -> None:
+def test_moon_with_glare_adds_at_most_one_false_star() -> None:
     """The Moon with its glare."""
     distance = np.hypot(X - 600, Y - 500)
     level = 6 + np.where(distance < 12, 300, 0) + 2000 / (1 + distance**2 / 50)
@@ -114,7 +114,7 @@ def test_a_disc_counts_once_at_most() -> None:
     assert len(stars) > 30
 
 
-def test_the_angle_is_that_of_the_streak() -> None:
+def test_spot_angle_is_the_angle_of_the_streak() -> None:
     """Turned by less and by more than the diagonal, to either side."""
     angles = np.radians([20, 70, 110, 160])
     ahead = np.linspace(-8, 8, 17)[:, None, None] * np.stack([np.cos(angles), np.sin(angles)], -1)
@@ -125,7 +125,7 @@ def test_the_angle_is_that_of_the_streak() -> None:
     np.testing.assert_allclose(streaks.angle[order], angles, atol=0.03)
 
 
-def test_a_picture_of_more_stripes_than_can_be_listed_has_no_regions() -> None:
+def test_image_with_too_many_stripes_yields_no_regions() -> None:
     stars = found(np.where(X % 30 < 3, 200, 6).astype(np.uint8))
     assert stars.light is not None
     assert (len(stars), stars.light.rejected, stars.light.widest) == (0, 0, 0)
@@ -149,7 +149,7 @@ def swept(
 
 @pytest.mark.parametrize("angle_deg", [0, 30, 90, 135])
 @pytest.mark.parametrize("length", [0.0, 6.0, 20.0])
-def test_length_of_bright_streaks(length: float, angle_deg: float) -> None:
+def test_smear_length_of_bright_streaks_is_measured(length: float, angle_deg: float) -> None:
     image = swept(length, angle_deg, light=4000, count=4)
     found_px = smear_px(image, find_regions(image > 12), 6)
     assert found_px == pytest.approx(length, abs=1.5)
@@ -157,7 +157,7 @@ def test_length_of_bright_streaks(length: float, angle_deg: float) -> None:
 
 @pytest.mark.parametrize("angle_deg", [0, 40, 90, 160])
 @pytest.mark.parametrize("length", [8.0, 20.0, 60.0])
-def test_streaks_that_lie_the_same_way_are_motion(length: float, angle_deg: float) -> None:
+def test_parallel_streaks_are_measured_as_motion(length: float, angle_deg: float) -> None:
     stars = found(swept(length, angle_deg, light=200 * length))
     assert stars.smear_px == pytest.approx(length, rel=0.2)
     assert len(stars) == 12
@@ -171,20 +171,20 @@ def test_streaks_around_the_boresight_are_motion() -> None:
 
 
 @pytest.mark.parametrize(("count", "length"), [(3, 12), (2, 0)])
-def test_three_parallel_streaks_tell_a_motion_and_two_do_not(count: int, length: float) -> None:
+def test_three_parallel_streaks_are_motion_and_two_are_not(count: int, length: float) -> None:
     places = FIELD.centre + np.array([[100, 50], [-200, 80], [30, -250]][:count])
     kept, smear = without_tracks(long_spots(places, np.full(count, 0.7)), FIELD)
     assert (len(kept), smear) == (count if length else 0, pytest.approx(length))
 
 
-def test_tracks_in_all_directions_are_left_out() -> None:
+def test_tracks_in_random_directions_are_discarded() -> None:
     rng = np.random.default_rng(1)
     spots = long_spots(FIELD.centre + rng.uniform(-300, 300, (20, 2)), rng.uniform(0, np.pi, 20))
     kept, smear = without_tracks(spots, FIELD)
     assert (len(kept), smear) == (0, 0)
 
 
-def test_stars_at_rest_are_not_drawn_out() -> None:
+def test_unsmeared_stars_have_no_measured_smear() -> None:
     """Nor are noise alone, bright stars in rows and columns, a slope, or a glow."""
     y, x = np.mgrid[: FIELD.rows, : FIELD.columns]
     glow = 30 * np.exp(-((x - 400) ** 2 + (y - 200) ** 2) / (2 * 300.0**2))
@@ -194,7 +194,7 @@ def test_stars_at_rest_are_not_drawn_out() -> None:
         assert len(stars) == (12 if light else 0)
 
 
-def test_without_regions_nothing_is_drawn_out() -> None:
+def test_smear_without_regions_is_0() -> None:
     image = np.zeros((FIELD.rows, FIELD.columns), np.uint8)
     assert smear_px(image, find_regions(image > 0), 0) == 0  # type: ignore[arg-type]
 
@@ -214,7 +214,7 @@ def test_smear_is_the_reason_when_there_is_no_attitude() -> None:
         assert (found.outcome, found.reason) == (MeasurementOutcome.NONE, reason)
 
 
-def test_a_skewed_picture_is_refused_and_a_smeared_one_is_not() -> None:
+def test_skewed_image_is_refused_and_smeared_image_is_not() -> None:
     made = picture(np.random.default_rng(2), FIELD).stars
     for skew, outcome in ((1.0, MeasurementOutcome.CONCLUSIVE), (9.0, MeasurementOutcome.NONE)):
         stars = StarList(made.centroids, made.brightness, 20.0, skew)

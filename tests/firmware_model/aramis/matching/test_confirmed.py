@@ -31,7 +31,7 @@ def found(made: Picture, stars: StarList | None = None, noise_px: float = 0.1) -
 
 
 @pytest.mark.parametrize("noise_px", [0.05, 0.2, 0.5])
-def test_its_errors_are_what_it_claims(noise_px: float) -> None:
+def test_confirmed_attitude_errors_match_the_reported_sigma(noise_px: float) -> None:
     inside = []
     for made in pictures(60, 7, Light(noise_px=noise_px)):
         solution = found(made, noise_px=noise_px)
@@ -44,12 +44,12 @@ def test_its_errors_are_what_it_claims(noise_px: float) -> None:
     assert 0.55 < np.mean(inside) < 0.85
 
 
-def test_a_focal_length_that_is_right_is_left_alone() -> None:
+def test_correct_focal_length_is_rarely_rescaled() -> None:
     scales = [found(made).rating.scale for made in pictures(15, 10)]  # type: ignore[union-attr]
     assert scales.count(1.0) >= 13
 
 
-def test_a_triangle_alone_is_not_believed() -> None:
+def test_triangle_without_confirming_stars_is_refused() -> None:
     for made in pictures(5, 11, Light(false_stars=20, most=60)):
         known = np.flatnonzero(np.isin(made.hip, database().numbers))[:3]
         false = np.flatnonzero(made.hip == 0)
@@ -58,7 +58,7 @@ def test_a_triangle_alone_is_not_believed() -> None:
         assert found(made, stars).reason is Reason.UNCONFIRMED
 
 
-def test_it_is_given_up_when_time_is_over() -> None:
+def test_identification_stops_at_its_time_limit() -> None:
     (made,) = pictures(1, 12, Light(mag_limit=-2.0, false_stars=40, most=60))
     spent = meter()
     short = replace(PROFILE, within_ms=20.0)
@@ -74,7 +74,9 @@ def test_rejects_uncertain_rotation() -> None:
     assert (solution.quaternion, solution.reason) == (None, Reason.UNCONFIRMED)
 
 
-def test_stars_that_determine_no_attitude_confirm_none(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_stars_that_determine_no_attitude_are_not_confirmed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     (made,) = pictures(1, 15, Light(most=6))
     undetermined = Mock(side_effect=AttitudeError("the vectors all point the same way"))
     assert found(made).reason is Reason.CONFIRMED
@@ -108,7 +110,9 @@ def turned(
 
 
 @pytest.mark.parametrize("turn", [ROLL, ACROSS, (0.0003, -0.0008, 0.003)])
-def test_a_turn_is_taken_back(turn: tuple[float, float, float], rng: np.random.Generator) -> None:
+def test_rolling_shutter_rotation_is_corrected(
+    turn: tuple[float, float, float], rng: np.random.Generator
+) -> None:
     vectors, heights = stars(rng, 20)
     wrong = Rotation.from_rotvec((2e-4, -1e-4, 5e-4))  # the attitude's own error is no turn
     moved = turned(vectors, heights, turn)
@@ -119,7 +123,7 @@ def test_a_turn_is_taken_back(turn: tuple[float, float, float], rng: np.random.G
     assert weights.min() > 0.05
 
 
-def test_a_wrong_star_counts_less(rng: np.random.Generator) -> None:
+def test_shutter_correction_gives_a_wrong_star_low_weight(rng: np.random.Generator) -> None:
     vectors, heights = stars(rng, 12)
     moved = turned(vectors, heights, ROLL)
     moved[3] += (3e-3, 0, 0)
@@ -128,7 +132,7 @@ def test_a_wrong_star_counts_less(rng: np.random.Generator) -> None:
     assert np.abs(np.delete(straight - vectors, 3, axis=0)).max() < 2e-4
 
 
-def test_few_stars_leave_more_doubt(rng: np.random.Generator) -> None:
+def test_shutter_sigma_is_larger_with_few_stars(rng: np.random.Generator) -> None:
     """The reported uncertainty is about the real error for any stars."""
     doubts = {}
     for count in (FEWEST, 30):

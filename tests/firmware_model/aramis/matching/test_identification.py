@@ -39,27 +39,27 @@ def run(
     return named(made.stars, profile, hint)
 
 
-def test_the_published_profile_is_mostly_right_and_sometimes_wrong() -> None:
+def test_published_profile_is_mostly_right_and_sometimes_wrong() -> None:
     """The thesis has 60 % conclusive results, many of them wrong, with more noise than here."""
     found = rates(120, PUBLISHED.profile)
     assert found["right"] > 0.9
     assert found["wrong"] > 0.005
 
 
-def test_with_more_noise_than_assumed_the_published_profile_fails_as_published() -> None:
+def test_published_profile_fails_as_published_in_excess_noise() -> None:
     found = rates(120, PUBLISHED.profile, light=NOISY)
     assert 0.5 < found["right"] + found["wrong"] < 0.8
     assert found["wrong"] > 0.1
     assert found["far"] > 0.03
 
 
-def test_a_rough_direction_leaves_only_right_results() -> None:
+def test_rough_direction_leaves_no_wrong_results() -> None:
     found = rates(120, PUBLISHED.profile, hint_error_deg=2)
     assert found["wrong"] == 0
     assert found["right"] > 0.95
 
 
-def test_a_rough_direction_rules_out_what_is_far_away() -> None:
+def test_rough_direction_rules_out_far_results_in_noise() -> None:
     """The thesis' own criterion of a true result, in the noise that fails without a direction."""
     found = rates(120, PUBLISHED.profile, light=NOISY, hint_error_deg=2)
     assert found["far"] == 0
@@ -86,7 +86,7 @@ def test_verification_accepts_right_solutions(
     assert found["right"] >= right
 
 
-def test_all_confirming_stars_make_the_attitude_better() -> None:
+def test_confirming_stars_improve_the_attitude_of_a_triangle() -> None:
     triple, all_stars = [], []
     for made in pictures(40, 3):
         plain, verified = run(made, replace(VERIFIED.profile, verify=False)), run(made)
@@ -98,7 +98,7 @@ def test_all_confirming_stars_make_the_attitude_better() -> None:
     assert np.max(all_stars, axis=0)[0] < 0.01
 
 
-def test_solution_fields() -> None:
+def test_solution_has_outcome_quaternion_and_star_numbers() -> None:
     (made,) = pictures(1, 4)
     solution = run(made)
     expected = MeasurementOutcome.CONCLUSIVE, Reason.CONFIRMED
@@ -113,7 +113,7 @@ def test_solution_fields() -> None:
 
 
 @pytest.mark.slow
-def test_the_order_of_brightness_is_not_needed() -> None:
+def test_identification_tolerates_a_wrong_brightness_order() -> None:
     """Verification distinguishes stars by their sides when their brightness misleads."""
     rng = np.random.default_rng(5)
     right = 0
@@ -130,7 +130,7 @@ def test_the_order_of_brightness_is_not_needed() -> None:
 
 @PROFILES
 @pytest.mark.parametrize("count", [0, 1, 2])
-def test_too_few_stars(count: int, profile: Profile) -> None:
+def test_too_few_stars_yield_no_attitude(count: int, profile: Profile) -> None:
     (made,) = pictures(1, 6)
     stars = StarList(made.stars.centroids[:count], made.stars.brightness[:count])
     solution = named(stars, profile)
@@ -138,7 +138,7 @@ def test_too_few_stars(count: int, profile: Profile) -> None:
 
 
 @PROFILES
-def test_stars_that_all_coincide(profile: Profile) -> None:
+def test_coinciding_stars_are_refused_as_degenerate(profile: Profile) -> None:
     stars = StarList(np.full((6, 2), 500, dtype=np.float32), np.ones(6, dtype=np.float32))
     solution = named(stars, profile)
     reason = Reason.NO_TRIANGLE if profile.verify else Reason.DEGENERATE
@@ -154,7 +154,7 @@ def test_invalid_direction_gives_no_solution(profile: Profile, value: float) -> 
 
 
 @PROFILES
-def test_opposite_direction_gives_no_solution(profile: Profile) -> None:
+def test_hint_in_the_opposite_direction_yields_no_solution(profile: Profile) -> None:
     for made in pictures(10, 7):
         solution = run(made, profile, -made.boresight.astype(np.float32))
         assert solution.outcome is not MeasurementOutcome.CONCLUSIVE
@@ -171,12 +171,12 @@ def test_rejects_attitude_far_from_the_hint() -> None:
         assert run(made, loose, hint).outcome is MeasurementOutcome.CONCLUSIVE
 
 
-def test_the_published_profile_ends_as_matching_does() -> None:
+def test_published_profile_ends_with_the_reasons_of_matching() -> None:
     reasons = {run(made, PUBLISHED.profile).reason for made in pictures(100, 9, Light(noise_px=1))}
     assert reasons >= {Reason.UNIQUE, Reason.NO_SHARED_PAIR}
 
 
-def test_phases_add_up() -> None:
+def test_identification_phases_add_up_to_the_total() -> None:
     (made,), spent = pictures(1, 10), meter()
     identify(made.stars, FIELD, VERIFIED.profile, database(), spent, made.boresight)
     assert set(spent.phases) >= {"faces", "triangles", "search", "verification", "attitude"}
@@ -195,7 +195,7 @@ def test_rejects_skewed_star_streaks(smear_px: float, skew_px: float, refused: b
     assert (found.triples == 0) == refused
 
 
-def test_stars_drawn_out_while_all_rows_were_exposed_at_once_are_not_set_straight() -> None:
+def test_streaks_with_simultaneous_exposure_get_no_shutter_correction() -> None:
     """No star moved between rows, so the attitude is that of a list without streaks."""
     (made,) = pictures(1)
     smeared = StarList(made.stars.centroids, made.stars.brightness, smear_px=9.0)
@@ -204,7 +204,7 @@ def test_stars_drawn_out_while_all_rows_were_exposed_at_once_are_not_set_straigh
     np.testing.assert_array_equal(drawn_out.quaternion, still.quaternion)
 
 
-def test_sides() -> None:
+def test_sides_agree_within_tolerance() -> None:
     vectors = np.array([[0, 0, 1], [0.1, 0, 1], [0, 0.2, 1]], dtype=np.float32)
     for star in range(3):
         moved = vectors.copy()
@@ -216,7 +216,7 @@ def test_sides() -> None:
     assert not sides_agree(vectors, np.full((3, 3), np.nan, dtype=np.float32), 1, meter())
 
 
-def test_a_mirror_image_does_not_agree() -> None:
+def test_mirrored_triangle_does_not_match() -> None:
     """An isosceles triangle with two stars exchanged: its sides are the same."""
     vectors = np.array([[0, 0, 1], [0.1, 0.1, 1], [-0.1, 0.1, 1]], dtype=np.float32)
     assert sides_agree(vectors, vectors, 1e-6, meter())
@@ -251,7 +251,7 @@ def solutions(body: Array, inertial: Array) -> Array:
 
 
 @pytest.mark.parametrize("seed", range(50))
-def test_the_quartic_is_the_characteristic_polynomial(seed: int) -> None:
+def test_quartic_is_the_characteristic_polynomial(seed: int) -> None:
     made = profile(np.random.default_rng(seed), 4, 0.5)
     square, linear, constant = quartic(made.astype(np.float32), meter())
     expected = np.poly(davenport(made))
@@ -259,7 +259,7 @@ def test_the_quartic_is_the_characteristic_polynomial(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(50))
-def test_contradicting_vectors_lower_the_root(seed: int) -> None:
+def test_contradicting_vectors_lower_the_largest_eigenvalue(seed: int) -> None:
     made = profile(np.random.default_rng(seed), 5, 0.3)
     expected = np.linalg.eigvalsh(davenport(made))[-1]
     assert expected < 0.999
@@ -267,7 +267,7 @@ def test_contradicting_vectors_lower_the_root(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(50))
-def test_stars_of_one_field_leave_the_root_at_1(seed: int) -> None:
+def test_largest_eigenvalue_of_stars_of_one_field_is_1(seed: int) -> None:
     """Their two largest roots are so close that a rounding error taken for a step would cost
     degrees of roll."""
     rng = np.random.default_rng(seed)
@@ -291,6 +291,6 @@ def test_quest_with_the_quartic_solves_wahbas_problem(seed: int) -> None:
     assert found.magnitude() < min(5e-5, plain.magnitude())
 
 
-def test_a_profile_of_nothing_ends() -> None:
+def test_largest_eigenvalue_ends_for_zero_and_nan_matrices() -> None:
     assert 0 <= largest_eigenvalue(np.zeros((3, 3), dtype=np.float32), meter()) <= 1
     assert not largest_eigenvalue(np.full((3, 3), np.nan, dtype=np.float32), meter()) > 1

@@ -42,7 +42,7 @@ def measure(corners: Array, sigma: float = 1e-4) -> Triangle:
 
 
 @pytest.mark.parametrize("seed", range(100))
-def test_area_and_moment(seed: int) -> None:
+def test_triangle_area_and_moment_match_double_precision(seed: int) -> None:
     (corners,) = in_field(np.random.default_rng(seed))
     triangle = measure(corners)
     area, moment = truth(corners)
@@ -50,7 +50,7 @@ def test_area_and_moment(seed: int) -> None:
     assert triangle.moment == pytest.approx(moment, rel=1e-3, abs=1e-9)
 
 
-def test_the_moment_is_that_of_the_surface() -> None:
+def test_triangle_moment_is_the_second_moment_of_its_area() -> None:
     """Second moment about the middle, over points spread evenly in the triangle."""
     corners = np.array([[0, 0, 1.0], [0.1, 0, 1], [0.03, 0.08, 1]])
     u, v = np.random.default_rng(1).uniform(size=(2, 400_000))
@@ -65,7 +65,7 @@ def test_the_moment_is_that_of_the_surface() -> None:
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_the_noise_is_that_of_dice(seed: int) -> None:
+def test_triangle_sigmas_match_simulated_noise(seed: int) -> None:
     rng = np.random.default_rng(seed)
     sigma = 1e-4
     while True:
@@ -83,7 +83,7 @@ def test_the_noise_is_that_of_dice(seed: int) -> None:
 
 
 @pytest.mark.parametrize("order", [(0, 2, 1), (1, 0, 2), (2, 1, 0), (1, 2, 0), (2, 0, 1)])
-def test_the_order_of_stars_does_not_matter(order: tuple[int, ...]) -> None:
+def test_triangle_measures_do_not_depend_on_the_star_order(order: tuple[int, ...]) -> None:
     (corners,) = in_field(np.random.default_rng(7))
     first, second = measure(corners), measure(corners[list(order)])
     for name in ("area", "moment", "area_sigma", "moment_sigma"):
@@ -101,7 +101,7 @@ def test_stars_on_a_line_give_no_triangle(corners: Array) -> None:
     assert measure_triangle(corners.astype(np.float32), 1e-4, meter()) is None
 
 
-def test_a_triangle_costs_the_same_wherever_it_is() -> None:
+def test_triangle_cost_does_not_depend_on_its_position() -> None:
     costs = set()
     for corners in in_field(np.random.default_rng(3), 10):
         spent = meter()
@@ -130,7 +130,9 @@ def brightness(magnitudes: Vectors) -> Vectors:
 
 @pytest.mark.parametrize("seed", range(10))
 @pytest.mark.parametrize("order", list(permutations(range(3))))
-def test_both_criteria_find_the_order(seed: int, order: tuple[int, ...]) -> None:
+def test_brightness_and_side_criteria_assign_the_same_order(
+    seed: int, order: tuple[int, ...]
+) -> None:
     """Measured star i is the catalogue's star order[i]."""
     catalogue, picked = corners(seed), list(order)
     found = assign(
@@ -141,7 +143,7 @@ def test_both_criteria_find_the_order(seed: int, order: tuple[int, ...]) -> None
 
 
 @pytest.mark.parametrize("order", list(permutations(range(3))))
-def test_the_more_varied_criterion_wins(order: tuple[int, ...]) -> None:
+def test_assignment_uses_the_criterion_with_larger_variation(order: tuple[int, ...]) -> None:
     catalogue, picked = corners(3), list(order)
     wrong = np.roll(picked, 1)
     measured = sides(catalogue[picked])
@@ -153,7 +155,7 @@ def test_the_more_varied_criterion_wins(order: tuple[int, ...]) -> None:
     assert [weak.order.tolist(), weak.other.tolist()] == [picked, wrong.tolist()]
 
 
-def test_scores_are_the_coefficients_of_variation() -> None:
+def test_assignment_scores_are_coefficients_of_variation() -> None:
     catalogue = corners(5)
     light, measured = brightness(MAGNITUDES), sides(catalogue)
     scores = assign(light, measured, MAGNITUDES, catalogue, meter()).scores
@@ -168,7 +170,7 @@ def test_variation_does_not_depend_on_the_unit() -> None:
     assert second == pytest.approx(first, rel=1e-5)
 
 
-def test_equal_values_score_nothing() -> None:
+def test_equal_values_have_zero_variation() -> None:
     assert variation(np.full(3, 7, dtype=np.float32), meter()) == 0
     assert variation(np.zeros(3, dtype=np.float32), meter()) == 0
 
@@ -215,7 +217,7 @@ def scored(light: Array, vectors: Array, known: Array) -> list[int]:
 @pytest.mark.parametrize(
     "light", quick([Light(mag_limit=5, false_stars=3), Light(), Light(noise_px=1)], 1)
 )
-def test_triangles_and_names_as_listed(light: Light, aided: bool) -> None:
+def test_triangles_and_identities_equal_the_printed_listing(light: Light, aided: bool) -> None:
     onboard = database()
     for made in pictures(40, 12, light):
         hint = made.boresight.astype(np.float32) if aided else None
@@ -230,7 +232,7 @@ def test_triangles_and_names_as_listed(light: Light, aided: bool) -> None:
         assert (found.pivots, found.stars[found.stars != NONE].tolist()) == (pivots, names)
 
 
-def test_a_fourth_star_is_needed() -> None:
+def test_identification_with_three_stars_is_refused() -> None:
     (made,) = pictures(1, 6)
     three = StarList(made.stars.centroids[:3], made.stars.brightness[:3])
     assert identify(three, FIELD, PRINTED, database(), meter()).reason is Reason.TOO_FEW_STARS

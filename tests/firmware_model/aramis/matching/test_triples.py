@@ -57,7 +57,7 @@ def triangle_of(hip: NDArray[np.int32]) -> int | None:
 
 @pytest.mark.parametrize("sigma", [3.7e-5, 1.7e-4])
 @pytest.mark.parametrize("aided", [False, True])
-def test_candidates_are_those_of_comparing_everything(sigma: float, aided: bool) -> None:
+def test_triangle_candidates_equal_brute_force_comparison(sigma: float, aided: bool) -> None:
     onboard = database()
     all_moments = np.empty_like(onboard.moments)
     all_moments[onboard.moment_triangles] = onboard.moments
@@ -71,7 +71,7 @@ def test_candidates_are_those_of_comparing_everything(sigma: float, aided: bool)
         assert sorted(found.tolist()) == np.flatnonzero(expected).tolist()
 
 
-def test_a_search_looks_at_less_than_a_hundredth_of_the_database() -> None:
+def test_search_reads_less_than_a_hundredth_of_the_database() -> None:
     onboard = database()
     for _, triangle in triangles(60, SIGMA, seed=1):
         for index, values, middle, sigma in (
@@ -84,7 +84,7 @@ def test_a_search_looks_at_less_than_a_hundredth_of_the_database() -> None:
 
 
 @pytest.mark.slow
-def test_the_true_triangle_is_nearly_always_a_candidate() -> None:
+def test_true_triangle_is_nearly_always_a_candidate() -> None:
     """Two bounds of three sigma that are not independent: at least 99 % with the right noise."""
     onboard, found, listed = database(), 0, 0
     sigma = 0.1 * FIELD.scale[0]
@@ -113,14 +113,14 @@ def test_pivots_leave_the_true_triangle() -> None:
     assert ends.count(Reason.UNIQUE) > 0.9 * len(ends)
 
 
-def test_each_pivot_thins_the_candidates() -> None:
+def test_each_pivot_star_reduces_the_candidates() -> None:
     for made in pictures(20, seed=4):
         found = [match(directions(made), (3, 4, 5)[:count], 2e-4) for count in range(4)]
         left = [set(one.candidates.tolist()) for one in found]
         assert left[3] <= left[2] <= left[1] <= left[0]
 
 
-def test_survivors_of_pivots_share_two_stars_with_a_candidate_of_each() -> None:
+def test_pivot_survivors_share_two_stars_with_a_candidate_of_each_pivot() -> None:
     """The pivots are 1 2 4, 1 3 5 and 1 2 6, counted from 1."""
     onboard, sigma, thinned = database(), 4e-4, 0
     for made in pictures(10, seed=5):
@@ -140,7 +140,7 @@ def test_survivors_of_pivots_share_two_stars_with_a_candidate_of_each() -> None:
     assert thinned > 10
 
 
-def test_bounds_of_the_area_hold_to_the_last_triangle() -> None:
+def test_triangle_search_includes_areas_at_both_bounds() -> None:
     """With a moment that excludes nothing, the candidates are a stretch of the list of areas."""
     onboard, rng = database(), np.random.default_rng(7)
     for _ in range(20):
@@ -154,7 +154,7 @@ def test_bounds_of_the_area_hold_to_the_last_triangle() -> None:
         assert np.sort(found).tolist() == np.flatnonzero(inside).tolist()
 
 
-def test_enough_candidates_need_no_pivot() -> None:
+def test_search_skips_pivots_when_candidates_are_few_enough() -> None:
     (made,) = pictures(1, seed=6)
     vectors = directions(made)
     plain = match(vectors, (), 1e-4)
@@ -168,12 +168,14 @@ def test_enough_candidates_need_no_pivot() -> None:
     ("vectors", "end"),
     [([[1, 0, 0], [0, 1, 0], [0, 0, 1]], Reason.NO_TRIANGLE), ([[0, 0, 1]] * 3, Reason.DEGENERATE)],
 )
-def test_triangles_that_the_sky_does_not_have(vectors: list[list[int]], end: Reason) -> None:
+def test_triangle_absent_from_the_catalogue_is_refused(
+    vectors: list[list[int]], end: Reason
+) -> None:
     found = match(np.array(vectors, dtype=np.float32), (), SIGMA)
     assert (found.end, len(found.candidates)) == (end, 0)
 
 
-def test_phases_are_booked() -> None:
+def test_triple_matching_charges_its_phases() -> None:
     (made,) = pictures(1, seed=6)
     spent = meter()
     match_triple(directions(made), (0, 1, 2), (3, 4, 5), 2e-4, database(), None, spent)
@@ -200,27 +202,27 @@ class Search(TripleTriangles):
 
 
 @pytest.mark.parametrize("count", [3, 4, 7, 12])
-def test_the_order_has_every_triple_once(count: int) -> None:
+def test_pyramid_order_contains_every_triple_once(count: int) -> None:
     triples = list(pyramid(count))
     assert all(a < b < c for a, b, c in triples)
     assert sorted(triples) == sorted(combinations(range(count), 3))
 
 
-def test_no_star_spoils_a_run_of_triples() -> None:
+def test_no_star_occurs_in_more_than_3_consecutive_triples() -> None:
     triples = list(islice(pyramid(40), 500))
     for star in range(40):
         runs = "".join("x" if star in triple else " " for triple in triples).split()
         assert max(map(len, runs)) <= 3
 
 
-def test_first_triangles_are_right() -> None:
+def test_first_triangles_found_are_right() -> None:
     for made in pictures(20, 1):
         found = Search(made).first()
         assert (database().numbers[found.stars] == made.hip[found.centroids]).all()
 
 
 @pytest.mark.slow
-def test_mirrored_stars_suggest_hardly_anything() -> None:
+def test_mirrored_stars_yield_no_triangles() -> None:
     for made in pictures(10, 2):
         mirrored = made.stars.centroids * [-1, 1] + [FIELD.columns - 1, 0]
         made.stars.centroids[:] = mirrored
@@ -228,14 +230,14 @@ def test_mirrored_stars_suggest_hardly_anything() -> None:
 
 
 @pytest.mark.parametrize("scale", [0.97, 0.995, 1.01, 1.03])
-def test_another_focal_length_is_found(scale: float) -> None:
+def test_triangle_search_estimates_the_focal_length_error(scale: float) -> None:
     for made in pictures(5, 3):
         centre = np.array(FIELD.centre, np.float32)
         made.stars.centroids[:] = (made.stars.centroids - centre) * scale + centre
         assert 1 / Search(made).first().factors == pytest.approx(scale, abs=0.008)
 
 
-def test_triangles_far_from_the_hint_are_left_out() -> None:
+def test_triangles_far_from_the_hint_are_excluded() -> None:
     (made,) = pictures(1, 5)
     for hint, found in ((made.boresight, True), (-made.boresight, False)):
         search = Search(made)
@@ -243,7 +245,7 @@ def test_triangles_far_from_the_hint_are_left_out() -> None:
         assert any(len(step.stars) for step in search.steps(6)) == found
 
 
-def test_time_is_charged_by_what_was_tried() -> None:
+def test_triangle_search_is_charged_per_triple_tried() -> None:
     (made,) = pictures(1, 4, Light(mag_limit=-2.0, false_stars=30))
     spent = meter()
     whole = Search(made, spent)

@@ -25,7 +25,7 @@ IMAGE = REGISTERS["IMAGE"].address
 
 
 @pytest.mark.parametrize(("letter", "camera"), [(b"a", Camera.NADIR), (b"q", Camera.SUN)])
-def test_a_picture_is_taken(node: Links, letter: bytes, camera: Camera) -> None:
+def test_bench_letter_captures_with_its_camera(node: Links, letter: bytes, camera: Camera) -> None:
     assert CAPTURES[camera].request == letter
     for byte in letter:
         node.bench.uart_byte(byte)
@@ -37,7 +37,7 @@ def test_a_picture_is_taken(node: Links, letter: bytes, camera: Camera) -> None:
 
 
 @pytest.mark.parametrize("outcome", [CaptureResult.CAMERA_TIMEOUT, CaptureResult.SRAM_OVER_CURRENT])
-def test_a_capture_that_fails_is_not_answered(node: Links, outcome: CaptureResult) -> None:
+def test_bench_does_not_answer_a_failed_capture(node: Links, outcome: CaptureResult) -> None:
     node.outcome = outcome
     assert node.letters(b"aq") == b""
     node.outcome = CaptureResult.STORED_OWN_SRAM
@@ -45,7 +45,9 @@ def test_a_capture_that_fails_is_not_answered(node: Links, outcome: CaptureResul
 
 
 @pytest.mark.parametrize(("letter", "camera"), [(b"s", Camera.NADIR), (b"w", Camera.SUN)])
-def test_a_picture_is_sent_at_the_line_s_pace(node: Links, letter: bytes, camera: Camera) -> None:
+def test_image_is_sent_at_the_line_rate_with_at_most_two_chunks_waiting(
+    node: Links, letter: bytes, camera: Camera
+) -> None:
     assert DOWNLOADS[camera].request == letter
     backlogs: list[int] = []
     node.on_request = lambda _request: backlogs.append(node.uart_backlog(Port.BENCH))
@@ -61,12 +63,12 @@ def test_letters_are_answered_in_their_order(node: Links) -> None:
     assert answer == b"Y" + nadir + b"Y" + sun
 
 
-def test_excess_letters_are_dropped(node: Links) -> None:
+def test_excess_bench_letters_are_dropped(node: Links) -> None:
     assert node.letters(b"a" * (LETTERS + 3)) == b"Y" * LETTERS
     assert node.letters(b"a") == b"Y"
 
 
-def test_other_bytes_are_ignored(node: Links) -> None:
+def test_bench_ignores_bytes_that_are_no_letters(node: Links) -> None:
     letters = {letter.request[0] for letter in (*CAPTURES.values(), *DOWNLOADS.values())}
     assert node.letters(bytes(byte for byte in range(256) if byte not in letters)) == b""
     node.bench.uart_silence()
@@ -75,7 +77,7 @@ def test_other_bytes_are_ignored(node: Links) -> None:
     assert not node.state.flags
 
 
-def test_letters_and_telecommands_have_their_own_places(node: Links) -> None:
+def test_bench_letters_and_telecommands_have_separate_queues(node: Links) -> None:
     for _ in range(LETTERS):
         node.bench.uart_byte(ord("a"))
     assert [node.send("CaptureOnly") for _ in range(5)] == [0, 0, 0, 0, 4]
@@ -83,7 +85,7 @@ def test_letters_and_telecommands_have_their_own_places(node: Links) -> None:
     assert [entry[1] for entry in node.done] == [Camera.SUN] * 4 + [Camera.NADIR] * 4
 
 
-def test_a_telecommand_does_not_wait_for_the_end_of_a_picture(node: Links) -> None:
+def test_telecommand_is_executed_during_a_bench_download(node: Links) -> None:
     node.bench.uart_byte(ord("s"))
     node.run(5)
     node.send("CaptureOnly", Sram=Sram.SRAM1)
@@ -94,7 +96,7 @@ def test_a_telecommand_does_not_wait_for_the_end_of_a_picture(node: Links) -> No
     assert len(node.opened) == 2
 
 
-def test_the_register_stream_waits_for_the_end_of_a_picture(node: Links) -> None:
+def test_register_stream_waits_for_the_end_of_a_bench_download(node: Links) -> None:
     node.bench.uart_byte(ord("w"))
     node.run(5)
     data = node.read_register(100, IMAGE)
@@ -104,7 +106,7 @@ def test_the_register_stream_waits_for_the_end_of_a_picture(node: Links) -> None
 
 
 @pytest.mark.parametrize("when", ["before", "meanwhile"])
-def test_a_memory_without_supply_ends_the_answer(node: Links, when: str) -> None:
+def test_bench_download_ends_when_the_memory_loses_its_supply(node: Links, when: str) -> None:
     if when == "before":
         node.off = {Sram.SRAM2}
     else:
@@ -130,7 +132,7 @@ def said(unit: Harness, *message: int) -> bytes:
     return answer
 
 
-def test_example_of_the_page(unit: Harness) -> None:
+def test_documented_backup_uart_examples_work(unit: Harness) -> None:
     (block,) = re.findall(r"```registers\n(.*?)```", PAGE.read_text("utf-8"), re.DOTALL)
     lines = block.splitlines()
     for request, answer in zip(lines[::2], lines[1::2], strict=True):
@@ -140,7 +142,7 @@ def test_example_of_the_page(unit: Harness) -> None:
     assert said(unit, READ, 0x28) == bytes([codes.CaptureResult.STORED_OWN_SRAM])
 
 
-def test_every_number_is_that_of_i2c(unit: Harness) -> None:
+def test_backup_uart_returns_the_same_register_values_as_i2c(unit: Harness) -> None:
     for register in REGISTERS:
         if register.readable and not register.streams:
             expected = unit.read_register(register.length, register.address)
@@ -150,7 +152,7 @@ def test_every_number_is_that_of_i2c(unit: Harness) -> None:
     assert said(unit, READ, 0xEE) == b""
 
 
-def test_what_can_not_be_written_is_ignored(unit: Harness) -> None:
+def test_backup_uart_ignores_writes_to_read_only_registers(unit: Harness) -> None:
     before = [said(unit, READ, r.address) for r in REGISTERS if r.readable and not r.streams]
     for address, value in ((0x20, 1), (0x05, 2), (0xEE, 1), (IMAGE, 1)):
         assert said(unit, WRITE, address, value) == b""
@@ -158,7 +160,7 @@ def test_what_can_not_be_written_is_ignored(unit: Harness) -> None:
     assert after == before
 
 
-def test_noise_and_half_messages(unit: Harness) -> None:
+def test_backup_uart_ignores_noise_and_incomplete_messages(unit: Harness) -> None:
     assert said(unit, 0x00, 0x1F, WRITE - 2, READ, THRESHOLD) == b"\xe1"
     said(unit, WRITE, THRESHOLD)
     unit.program.backup.uart_silence()
@@ -167,7 +169,7 @@ def test_noise_and_half_messages(unit: Harness) -> None:
     assert said(unit, READ, THRESHOLD) == bytes([WRITE])
 
 
-def test_a_picture_and_what_ends_it(unit: Harness) -> None:
+def test_backup_uart_sends_the_image_until_another_message(unit: Harness) -> None:
     rng = np.random.default_rng(1)
     for sram in codes.Sram:
         unit.memories[sram] = rng.integers(0, 256, (480, 640), np.uint8)

@@ -28,7 +28,9 @@ def test_capture_and_detect_is_acknowledged(node: Links) -> None:
     ("request_id", "alpha", "answer"),
     [("96", None, "D204 C9FD 02 07"), ("94", 0x1F1F, "1F1F1F1F C9FD 02 07")],  # escapes doubled
 )
-def test_result_has_two_codes(node: Links, request_id: str, alpha: int | None, answer: str) -> None:
+def test_result_telemetry_has_capture_and_detect_codes(
+    node: Links, request_id: str, alpha: int | None, answer: str
+) -> None:
     node.command("CaptureAndDetect")
     if alpha is not None:
         node.state.results[codes.Camera.SUN].alpha = alpha
@@ -36,7 +38,7 @@ def test_result_has_two_codes(node: Links, request_id: str, alpha: int | None, a
     assert found == bytes.fromhex(f"1F7F {answer} 1FFF")
 
 
-def test_escapes_in_settings_are_undone(node: Links) -> None:
+def test_escaped_bytes_in_settings_are_decoded(node: Links) -> None:
     assert node.wire(bytes.fromhex("1F7F 2D 1F1F 1F1F 1F1F 8080 1FFF")) == OK
     node.run()
     settings = node.state.cameras[codes.Camera.NADIR]
@@ -44,7 +46,7 @@ def test_escapes_in_settings_are_undone(node: Links) -> None:
     assert (settings.blue_gain, settings.red_gain) == (0x80, 0x80)
 
 
-def test_an_escape_in_a_frame_number_is_undone(node: Links) -> None:
+def test_escaped_byte_in_a_frame_number_is_decoded(node: Links) -> None:
     node.command("StartImageDownload", Size=codes.ImageSize.SIDE_64)
     assert node.wire(bytes.fromhex("1F7F 41 1F1F 00 1FFF")) == OK
     node.run()
@@ -64,7 +66,9 @@ def test_an_escape_in_a_frame_number_is_undone(node: Links) -> None:
         ("64 02", AckError.BAD_PARAMETER),
     ],
 )
-def test_rejected_commands(node: Links, payload: str, error: AckError) -> None:
+def test_telecommands_are_rejected_with_their_error(
+    node: Links, payload: str, error: AckError
+) -> None:
     request = bytes.fromhex(payload)
     assert node.frames(request) == [bytes([error])]
     assert not node.queue
@@ -124,7 +128,7 @@ def test_reading_a_result_schedules_the_next(node: Links, identifier: int) -> No
 
 
 @pytest.mark.parametrize("identifier", telemetry.SCHEDULES)
-def test_on_i2c_it_does_so_when_the_transfer_has_ended(node: Links, identifier: int) -> None:
+def test_i2c_result_read_schedules_at_the_end_of_the_transfer(node: Links, identifier: int) -> None:
     camera, sram = telemetry.SCHEDULES[identifier]
     node.outcome = codes.CaptureResult.STORED_OTHER_SRAM
     node.command("CaptureAndDetect", Camera=camera)
@@ -147,7 +151,7 @@ def test_read_of_zero_bytes_schedules_nothing(node: Links) -> None:
     assert node.state.results[codes.Camera.SUN].capture is codes.CaptureResult.START_UP
 
 
-def test_a_schedule_that_meets_a_full_queue_leaves_the_result(node: Links) -> None:
+def test_result_survives_a_schedule_refused_by_a_full_queue(node: Links) -> None:
     node.command("CaptureAndDetect")
     for _ in range(4):
         node.send("ClearOverCurrent")
@@ -172,18 +176,18 @@ def test_counters_count_every_message_and_wrap(node: Links) -> None:
     assert (values["TcmdCount"], values["TlmCount"]) == (0, 0)
 
 
-def test_result_that_was_not_sent_schedules_nothing(node: Links) -> None:
+def test_unsent_result_schedules_no_measurement(node: Links) -> None:
     node.backlog = SEND_BYTES
     assert node.wire(bytes.fromhex("1F7F 96 1FFF")) == b""
     assert not node.queue
 
 
-def test_the_longest_answer_finds_room(node: Links) -> None:
+def test_longest_answer_fits_the_send_buffer(node: Links) -> None:
     node.commands.download.data[:] = 0x1F
     assert len(node.wire(bytes.fromhex("1F7F C0 1FFF"))) == SEND_BYTES
 
 
-def test_a_telecommand_on_i2c_is_polled(node: Links) -> None:
+def test_i2c_telecommand_is_polled_until_processed(node: Links) -> None:
     assert node.i2c_write(b"\x14\x01\x00") == 3
     assert node.i2c_read(3, 0x83) == bytes([20, 0, AckError.OK])
     node.run()
@@ -193,7 +197,7 @@ def test_a_telecommand_on_i2c_is_polled(node: Links) -> None:
     assert node.i2c_read(3, 0x83) == bytes([20, 1, AckError.BAD_PARAMETER])
 
 
-def test_processed_speaks_of_the_last_telecommand(node: Links) -> None:
+def test_processed_flag_refers_to_the_last_telecommand(node: Links) -> None:
     node.send("CaptureAndDetect")
     node.send("DetectionThreshold1")
     node.run(1)
@@ -202,7 +206,7 @@ def test_processed_speaks_of_the_last_telecommand(node: Links) -> None:
     assert node.telemetry("TcmdProcessed") == {"LastTcmd": 40, "Processed": 1, "Error": 0}
 
 
-def test_a_telecommand_is_not_processed_while_it_runs(node: Links) -> None:
+def test_telecommand_is_not_marked_processed_while_it_runs(node: Links) -> None:
     seen: set[int] = set()
     node.on_request = lambda _request: seen.add(node.telemetry("TcmdProcessed")["Processed"])
     node.command("CaptureAndDetect")

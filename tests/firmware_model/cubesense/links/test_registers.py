@@ -37,7 +37,7 @@ def test_every_readable_register_starts_with_its_declared_value(node: Links) -> 
             assert value(node, register.name) == register.field.reset, register.name
 
 
-def test_a_write_only_register_reads_as_nothing(node: Links) -> None:
+def test_write_only_register_reads_as_nothing(node: Links) -> None:
     for register in REGISTERS:
         if not register.readable:
             assert node.read_register(2, register.address) == bytes([FILL, FILL])
@@ -46,7 +46,9 @@ def test_a_write_only_register_reads_as_nothing(node: Links) -> None:
 @pytest.mark.parametrize(
     "register", [r for r in REGISTERS if r.readable and r.writable], ids=lambda r: r.name
 )
-def test_a_setting_is_read_back_and_is_the_node_s_own(node: Links, register: object) -> None:
+def test_written_register_reads_back_and_changes_only_that_setting(
+    node: Links, register: object
+) -> None:
     name = register.name  # type: ignore[attr-defined]
     before = {r.name: value(node, r.name) for r in REGISTERS if r.readable and not r.streams}
     write(node, name, 1)
@@ -64,14 +66,16 @@ def test_a_setting_is_read_back_and_is_the_node_s_own(node: Links, register: obj
         assert shown[f"{'AutoAdjust' if field == 'Auto' else field}{camera + 1}"] == 1
 
 
-def test_an_exposure_beyond_a_byte_reads_as_255(node: Links) -> None:
+def test_exposure_above_255_reads_as_255_in_one_byte(node: Links) -> None:
     node.command("CameraSettings2", Exposure=0x1F1F)
     assert value(node, "NADIR_EXPOSURE") == 255
 
 
 @pytest.mark.parametrize("target", codes.Measurement)
 @pytest.mark.parametrize("name", ["MEASURE", "CAPTURE"])
-def test_an_action_measures(node: Links, name: str, target: codes.Measurement) -> None:
+def test_writing_an_action_register_starts_a_measurement(
+    node: Links, name: str, target: codes.Measurement
+) -> None:
     write(node, name, target)
     camera, detect = target.camera, name == "MEASURE"
     pending = codes.DetectResult.PENDING if detect else codes.DetectResult.NONE_SCHEDULED
@@ -105,7 +109,7 @@ def test_over_current_flags_can_be_cleared(node: Links, selection: codes.SramSel
     assert node.done == [("clear", *cleared)]
 
 
-def test_ignores_values_out_of_range(node: Links) -> None:
+def test_register_writes_out_of_range_are_ignored(node: Links) -> None:
     state = {camera: asdict(settings) for camera, settings in node.state.cameras.items()}
     for register in REGISTERS:
         for number in range(256):
@@ -119,7 +123,7 @@ def test_ignores_values_out_of_range(node: Links) -> None:
     assert {camera: asdict(settings) for camera, settings in node.state.cameras.items()} == state
 
 
-def test_a_search_that_the_fpgas_are_not_built_for_is_ignored() -> None:
+def test_register_write_ignores_a_search_unsupported_by_the_fpgas() -> None:
     node = Links()
     write(node, "NADIR_SEARCH", codes.NadirSearch.AROUND_SAMPLES)
     assert value(node, "NADIR_SEARCH") == codes.NadirSearch.LINES
@@ -135,7 +139,7 @@ def test_action_is_dropped_when_the_queue_is_full(node: Links) -> None:
     assert len(node.done) == 4
 
 
-def test_an_action_is_no_telecommand(node: Links) -> None:
+def test_register_action_is_not_counted_as_a_telecommand(node: Links) -> None:
     node.send("CaptureOnly")
     write(node, "CLEAR_OVER_CURRENT", codes.SramSelection.BOTH)
     node.run(1)
@@ -144,7 +148,7 @@ def test_an_action_is_no_telecommand(node: Links) -> None:
     assert node.telemetry("TcmdProcessed") == {"LastTcmd": 21, "Processed": 1, "Error": 0}
 
 
-def test_a_value_is_latched_when_its_address_is_written(node: Links) -> None:
+def test_register_value_is_latched_when_its_address_is_written(node: Links) -> None:
     result = node.state.results[codes.Camera.SUN]
     result.x = 0x0102
     assert node.write_register(0x40) == 1
@@ -154,12 +158,12 @@ def test_a_value_is_latched_when_its_address_is_written(node: Links) -> None:
     assert node.read_register(2, 0x40) == b"\x03\x04"
 
 
-def test_the_pointer_stays_behind_a_write(node: Links) -> None:
+def test_register_pointer_stays_after_a_write(node: Links) -> None:
     write(node, "SUN_GAIN", 7)
     assert node.read_register(2) == bytes([7, FILL])
 
 
-def test_a_second_data_byte_is_not_acknowledged(node: Links) -> None:
+def test_second_data_byte_of_a_register_write_is_not_acknowledged(node: Links) -> None:
     assert node.write_register(REGISTERS["SUN_GAIN"].address, 7, 8, 9) == 2
     assert value(node, "SUN_GAIN") == 7
 
@@ -169,7 +173,9 @@ def test_read_without_pointer_returns_fill_bytes(node: Links) -> None:
 
 
 @pytest.mark.parametrize("sram", codes.Sram)
-def test_the_picture_comes_in_several_reads_and_is_read_once(node: Links, sram: codes.Sram) -> None:
+def test_image_register_is_read_in_parts_from_one_memory_read(
+    node: Links, sram: codes.Sram
+) -> None:
     write(node, "IMAGE_SRAM", sram)
     data = node.read_register(8192, IMAGE)
     while len(data) < codes.IMAGE_BYTES:
@@ -181,14 +187,14 @@ def test_the_picture_comes_in_several_reads_and_is_read_once(node: Links, sram: 
     assert not node.queue
 
 
-def test_what_is_read_ahead_is_bounded(node: Links) -> None:
+def test_image_read_ahead_is_bounded(node: Links) -> None:
     node.read_register(1, IMAGE)
     for _ in range(100):
         node.run()
     assert 1 <= node.read <= READ_AHEAD_BYTES + 1
 
 
-def test_more_is_read_as_soon_as_half_of_what_was_read_ahead_is_left(node: Links) -> None:
+def test_image_stream_reads_ahead_when_half_its_buffer_is_left(node: Links) -> None:
     node.write_register(IMAGE)
     node.registers.i2c_start(True)
     assert node.registers.i2c_read() is None
@@ -199,7 +205,7 @@ def test_more_is_read_as_soon_as_half_of_what_was_read_ahead_is_left(node: Links
     assert len(handed_out) == READ_AHEAD_BYTES // 2 + 1  # the last one finds a half
 
 
-def test_the_clock_is_stretched_until_the_first_bytes_are_there(node: Links) -> None:
+def test_i2c_clock_is_stretched_until_the_first_image_bytes_are_read(node: Links) -> None:
     node.write_register(IMAGE)
     node.registers.i2c_start(True)
     before = node.meter.counts["i2c_interrupt"]
@@ -220,7 +226,7 @@ def test_writing_the_pointer_ends_the_stream(node: Links, address: int) -> None:
     assert node.read_register(100, IMAGE) == node.pictures[0, :100].tobytes()
 
 
-def test_a_pointer_that_moves_while_the_picture_is_read_leaves_nothing(node: Links) -> None:
+def test_register_pointer_move_discards_image_bytes_being_read(node: Links) -> None:
     node.write_register(IMAGE)
     node.registers.i2c_start(True)
     assert node.registers.i2c_read() is None
@@ -230,7 +236,7 @@ def test_a_pointer_that_moves_while_the_picture_is_read_leaves_nothing(node: Lin
     assert node.read_register(70) == node.pictures[1, :70].tobytes()
 
 
-def test_a_measurement_in_between_does_not_show(node: Links) -> None:
+def test_capture_during_a_register_read_does_not_change_the_data(node: Links) -> None:
     data = node.read_register(1000, IMAGE)
     node.command("CaptureOnly", Sram=codes.Sram.SRAM2)
     data += node.read_register(1000)
@@ -245,14 +251,14 @@ def test_memory_without_supply_returns_fill_bytes(node: Links) -> None:
     assert node.read_register(200, IMAGE) == node.pictures[0, :200].tobytes()
 
 
-def test_a_memory_cut_off_meanwhile_ends_the_picture(node: Links) -> None:
+def test_register_read_returns_fill_bytes_after_the_memory_is_cut_off(node: Links) -> None:
     assert node.read_register(READ_AHEAD_BYTES, IMAGE)
     node.off = {codes.Sram.SRAM1}
     data = node.read_register(500)
     assert data.endswith(bytes([FILL] * 400))
 
 
-def test_a_download_at_the_same_time_leaves_both_whole(node: Links) -> None:
+def test_register_read_and_image_download_do_not_disturb_each_other(node: Links) -> None:
     node.command("StartImageDownload", Sram=codes.Sram.SRAM2, Size=0)
     data = b""
     for number in range(2176, 2196):

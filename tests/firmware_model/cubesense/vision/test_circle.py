@@ -20,7 +20,7 @@ def on_circle(rng: np.random.Generator, count: int, spread: float = 6.3) -> np.n
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_points_on_a_circle_give_it_back(meter: Meter, seed: int) -> None:
+def test_circle_fit_recovers_the_circle(meter: Meter, seed: int) -> None:
     data = on_circle(np.random.default_rng(seed), 20)
     circle = LeastSquaresCircle(data[:20].astype(np.float32), meter).solve()
     assert [circle.x, circle.y] == pytest.approx(data[20].tolist(), abs=0.01)
@@ -28,7 +28,7 @@ def test_points_on_a_circle_give_it_back(meter: Meter, seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(10))
-def test_the_fit_minimises_the_algebraic_error(meter: Meter, seed: int) -> None:
+def test_circle_fit_minimises_the_algebraic_error(meter: Meter, seed: int) -> None:
     rng = np.random.default_rng(seed)
     points = on_circle(rng, 12)[:12] + rng.normal(0, 2, (12, 2))
     circle = LeastSquaresCircle(points.astype(np.float32), meter).solve()
@@ -114,7 +114,7 @@ def jacobian(points: Points) -> tuple[Points, Points]:
 
 @pytest.mark.parametrize("arc_deg", [360.0, 150.0])
 @pytest.mark.parametrize("count", [5, 12, 28])
-def test_it_is_the_circle_of_least_squares(count: int, arc_deg: float) -> None:
+def test_limb_fit_is_the_least_squares_circle(count: int, arc_deg: float) -> None:
     points = circle(count, 0.3, arc_deg)
     limb = found(points)
     _, best = jacobian(points)
@@ -132,7 +132,7 @@ def test_it_is_the_circle_of_least_squares(count: int, arc_deg: float) -> None:
         (20, 6 / 23 * (1 + 40 / 289)),
     ],
 )
-def test_the_usual_variance_and_few_edges(count: int, variance: float) -> None:
+def test_limb_variance_with_few_edges_includes_prior_edges(count: int, variance: float) -> None:
     points = circle(count)
     limb = found(points)
     jac, _ = jacobian(points)
@@ -141,7 +141,7 @@ def test_the_usual_variance_and_few_edges(count: int, variance: float) -> None:
     assert limb.rms_px < 0.01
 
 
-def test_edges_left_out_and_residuals_make_it_less_sure() -> None:
+def test_limb_fit_covariance_grows_with_excluded_edges_and_residuals() -> None:
     whole, parts = (found(circle(20), moved) for moved in (0, 3))
     assert parts.on.tolist() == [True] * 17 + [False] * 3
     rest = found(circle(20)[:17])
@@ -159,7 +159,7 @@ def test_edges_left_out_and_residuals_make_it_less_sure() -> None:
     assert limb.covariance == pytest.approx(expected, rel=0.02, abs=1e-4)
 
 
-def test_residuals_are_those_after_the_last_step() -> None:
+def test_limb_residuals_are_those_after_the_last_fit_step() -> None:
     points = circle(28)
     points[0] += 0.2 * (points[0] - TRUE[:2]) / TRUE[2]
     limb = found(points, allowed=Tolerances(on_px=0.1, good_rms_px=1.0, usual_px=0.3))
@@ -171,15 +171,15 @@ def test_residuals_are_those_after_the_last_step() -> None:
     ("value", "cast"),
     [(2.9, 2), (-2.9, -2), (32767.5, 32767), (32768.0, -32768), (-32769.0, 32767), (65536.0, 0)],
 )
-def test_a_cast_truncates_and_wraps(value: float, cast: int) -> None:
+def test_float_to_int16_cast_truncates_and_wraps(value: float, cast: int) -> None:
     assert to_int16(np.float32(value)) == cast
 
 
-def test_a_sum_rounds_after_every_term() -> None:
+def test_sequential_sum_rounds_after_every_term() -> None:
     terms = np.array([2**24, 1, 1, 1, 1], np.float32)
     # Each 1 alone is lost beside 2^24; summed in pairs they would not be.
     assert sequential_sum(terms) == 2**24
 
 
-def test_the_sum_of_nothing_is_nothing() -> None:
+def test_sequential_sum_of_no_values_is_zero() -> None:
     assert sequential_sum(np.zeros((0, 3), np.float32)).tolist() == [0, 0, 0]

@@ -32,7 +32,7 @@ def exact(radius: float) -> float:
     return float(brentq(lambda wide: float(distort(wide)) - radius, 0, 340))
 
 
-def test_the_published_table(meter: Meter) -> None:
+def test_byte_distortion_table_matches_the_published_one(meter: Meter) -> None:
     table = byte_table(meter)
     assert table.size == TABLE_ENTRIES == 227
     assert table.differences[-1] == 49
@@ -42,7 +42,7 @@ def test_the_published_table(meter: Meter) -> None:
     assert table.differences.tolist() == wanted
 
 
-def test_the_published_interpolation_drops_the_radius_s_fraction(meter: Meter) -> None:
+def test_published_distortion_drops_the_fraction_of_the_radius(meter: Meter) -> None:
     table = byte_table(meter)
     # Table entries 13 and 14 px: 167 + 13 + 0.5.
     assert table.differences[167:169].tolist() == [14, 14]
@@ -53,7 +53,7 @@ def test_the_published_interpolation_drops_the_radius_s_fraction(meter: Meter) -
 
 
 @pytest.mark.parametrize("turn", range(0, 360, 40))
-def test_ours_is_right_to_a_fiftieth_of_a_pixel(
+def test_distortion_table_is_exact_to_a_fiftieth_of_a_pixel(
     meter: Meter, equidistant: RadiusTable, stereographic: RadiusTable, turn: int
 ) -> None:
     radii = np.linspace(1, 226, 150)
@@ -69,24 +69,26 @@ def test_ours_is_right_to_a_fiftieth_of_a_pixel(
     assert np.abs(measured - tangent[:, None] * along).max() < 0.025
 
 
-def test_the_boresight_stays(meter: Meter, equidistant: RadiusTable) -> None:
+def test_distortion_leaves_the_boresight_unchanged(meter: Meter, equidistant: RadiusTable) -> None:
     assert equidistant.correct(np.zeros((1, 2), np.float32), meter).tolist() == [[0, 0]]
 
 
-def test_beyond_the_table_its_last_step_goes_on(meter: Meter, equidistant: RadiusTable) -> None:
+def test_radius_table_is_extrapolated_with_its_last_step(
+    meter: Meter, equidistant: RadiusTable
+) -> None:
     points = np.array([[225, 0], [226, 0], [227, 0], [228.5, 0]], np.float32)
     x = equidistant.correct(points, meter)[:, 0].astype(int)
     assert x[2] - x[1] == pytest.approx(x[1] - x[0], abs=1)
     assert x[3] - x[1] == pytest.approx(2.5 * (x[1] - x[0]), abs=4)
 
 
-def test_results_wrap_as_an_int_does(meter: Meter) -> None:
+def test_distortion_results_wrap_at_16_bits(meter: Meter) -> None:
     far = RadiusTable(np.full(TABLE_ENTRIES, 150, np.int16), 1, 1, False)
     x = far.correct(np.array([[200, 0]], np.float32), meter)[0, 0]
     assert x == 35000 - 65536
 
 
-def test_other_coefficients(meter: Meter) -> None:
+def test_distortion_table_follows_other_coefficients(meter: Meter) -> None:
     table = fine_table(meter, Projection.EQUIDISTANT, (0.0, 0.5))
     assert table.differences.tolist() == [100 * radius for radius in range(TABLE_ENTRIES)]
 
@@ -97,7 +99,9 @@ def test_rejects_distortion_without_inverse(meter: Meter, coefficients: tuple[fl
         fine_table(meter, Projection.EQUIDISTANT, coefficients)
 
 
-def test_points_cost_the_same_and_a_wide_table_more(meter: Meter, equidistant: RadiusTable) -> None:
+def test_distortion_cost_is_equal_per_point_and_higher_for_wide_tables(
+    meter: Meter, equidistant: RadiusTable
+) -> None:
     table = byte_table(meter)
     costs = []
     for used, count in ((table, 1), (table, 10), (equidistant, 1)):
@@ -132,7 +136,7 @@ def random_factors(rng: np.random.Generator) -> list[float]:
             return [*changed, 1e-8 * rng.normal()]
 
 
-def test_what_is_accepted_gives_tables_and_lenses_like_ours_are() -> None:
+def test_lens_check_accepts_only_lenses_with_inverse_tables() -> None:
     rng = np.random.default_rng(54)
     verdicts: Counter[tuple[bool, bool]] = Counter()
     for _ in range(3000):
@@ -162,12 +166,14 @@ def test_what_is_accepted_gives_tables_and_lenses_like_ours_are() -> None:
         ((-32768, -32768, -32768, -32768, -32768), False),
     ],
 )
-def test_known_lenses(factors: Sequence[float], expected: bool) -> None:
+def test_lens_check_accepts_and_rejects_known_lenses(
+    factors: Sequence[float], expected: bool
+) -> None:
     assert invertible(factors, Meter(PIC18F45K20)) is expected
     assert tables_exist(factors) or not expected
 
 
-def test_a_dip_between_the_tried_radii_is_found() -> None:
+def test_lens_check_finds_a_negative_slope_between_its_samples() -> None:
     """The slope is 0.002 (r - 20)^2 - 0.05, so it is negative around 20 px only."""
     factors = (0, 0.75, -0.04, 0.002 / 3, 0)
     assert invertible(factors, Meter(PIC18F45K20)) is tables_exist(factors) is False
@@ -183,7 +189,7 @@ def test_slopes_are_compared_from_centre_to_rim(ratio: float, expected: bool) ->
     assert invertible((offset, slope, bend, 0, 0), Meter(PIC18F45K20)) is expected
 
 
-def test_it_is_quick() -> None:
+def test_lens_check_takes_under_a_tenth_of_the_table_time() -> None:
     meter, table = Meter(PIC18F45K20), Meter(PIC18F45K20)
     assert invertible(DISTORTION, meter)
     distortion.fine_table(table, distortion.Projection.STEREOGRAPHIC)

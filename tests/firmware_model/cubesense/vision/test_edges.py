@@ -76,12 +76,12 @@ def rows_of(first: int, values: NDArray[np.float64]) -> NDArray[np.uint8]:
 
 
 @pytest.mark.parametrize(("last", "ends"), [(330, 0), (353, 0), (354, 2), (450, 2)])
-def test_small_lights_make_no_edges(meter: Meter, last: int, ends: int) -> None:
+def test_small_lights_create_no_edges(meter: Meter, last: int, ends: int) -> None:
     edges = edges_in(rows_of(314, np.full(last - 313, 200.0)), meter, SHARP)
     assert np.count_nonzero((edges.points[:, 1] == 32 * 207) & (edges.sides[:, 0] != 0)) == ends
 
 
-def test_a_thin_crescent_has_its_limb(meter: Meter) -> None:
+def test_thin_crescent_yields_edges_of_the_limb_only(meter: Meter) -> None:
     edges = edges_in(rows_of(314, np.linspace(66, 40, 38)), meter, SHARP)
     in_rows = edges.sides[:, 0]
     assert np.count_nonzero(in_rows == 1) > 3
@@ -89,7 +89,9 @@ def test_a_thin_crescent_has_its_limb(meter: Meter) -> None:
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_agrees_with_the_literal_search_in_roughness(meter: Meter, seed: int) -> None:
+def test_edge_search_agrees_with_the_literal_search_in_noisy_images(
+    meter: Meter, seed: int
+) -> None:
     rng = np.random.default_rng(seed)
     picture = rough(rng)
     config = EdgeConfig(threshold=80, rim_px=float(rng.uniform(100, 230)))
@@ -111,7 +113,9 @@ def test_buffer_requests_64_pixels_and_32_at_the_end_of_a_column(meter: Meter) -
 
 
 @pytest.mark.parametrize(("start", "end", "steps"), [(200, 300, 6 + 6), (0, 463, 6 + 5)])
-def test_steps_of_the_binary_search(meter: Meter, start: int, end: int, steps: int) -> None:
+def test_binary_edge_search_reads_the_expected_pixels(
+    meter: Meter, start: int, end: int, steps: int
+) -> None:
     picture = np.zeros((ROWS, COLUMNS), np.uint8)
     picture[start:end, 127] = 70
     edges = edges_in(picture, meter, NO_RIM)
@@ -122,7 +126,7 @@ def test_steps_of_the_binary_search(meter: Meter, start: int, end: int, steps: i
 
 
 @pytest.mark.parametrize("first", [0, 1, 62, 63, 64, 65, 126, 127])
-def test_an_edge_on_any_pixel_of_the_buffer_is_exact(meter: Meter, first: int) -> None:
+def test_edge_at_any_buffer_position_is_located_exactly(meter: Meter, first: int) -> None:
     picture = np.zeros((ROWS, COLUMNS), np.uint8)
     picture[15, first:320] = 70
     edges = edges_in(picture, meter, NO_RIM)
@@ -130,7 +134,7 @@ def test_an_edge_on_any_pixel_of_the_buffer_is_exact(meter: Meter, first: int) -
     assert [point[0] for point in on_the_row][:2] == [first, 319]
 
 
-def test_sub_pixel_edges_lie_where_the_threshold_is_met(meter: Meter) -> None:
+def test_sub_pixel_edges_are_at_the_threshold_crossing(meter: Meter) -> None:
     picture = np.zeros((ROWS, COLUMNS), np.uint8)
     picture[79, 300:400] = 100
     picture[79, [299, 400]] = 40  # 70 is half-way from 40 to 100
@@ -154,7 +158,7 @@ def test_sub_pixel_edges_follow_the_limb(meter: Meter) -> None:
     assert spread[True] < 0.1 < 0.2 < spread[False]
 
 
-def test_the_rim_makes_no_edges(meter: Meter) -> None:
+def test_lens_rim_creates_no_edges_of_the_earth(meter: Meter) -> None:
     # The Earth fills one side of the field of view and ends at its rim.
     edges = edges_in(earth(75, 20), meter)
     assert edges.false > 3
@@ -184,7 +188,7 @@ def test_edges_in_a_mask_are_dropped(meter: Meter) -> None:
 
 
 @pytest.mark.parametrize("seed", range(50))
-def test_small_frames(meter: Meter, seed: int) -> None:
+def test_edge_search_equals_a_reference_on_small_frames(meter: Meter, seed: int) -> None:
     rng = np.random.default_rng(seed)
     small = ReadOut(columns=24, rows=20, scan_step=8, first_row=3, first_column=7, window=7)
     picture = rng.integers(0, 255, (20, 24)).astype(np.uint8)
@@ -202,7 +206,9 @@ def test_small_frames(meter: Meter, seed: int) -> None:
 
 @pytest.mark.parametrize("between", Between)
 @pytest.mark.parametrize(("alpha", "beta"), [(0, 0), (12, -7), (-20, 20)])
-def test_edges_of_rows(meter: Meter, between: Between, alpha: float, beta: float) -> None:
+def test_sample_search_finds_the_same_row_edges_as_the_line_search(
+    meter: Meter, between: Between, alpha: float, beta: float
+) -> None:
     picture = earth(alpha, beta, rng=np.random.default_rng(4))
     lines = edges_in(picture, meter)
     edges = run_search(
@@ -218,7 +224,7 @@ def test_edges_of_rows(meter: Meter, between: Between, alpha: float, beta: float
 
 
 @pytest.mark.parametrize("between", Between)
-def test_accuracy_from_few_pixels(
+def test_sample_search_is_accurate_from_few_pixels(
     stereographic: RadiusTable, between: Between, meter: Meter
 ) -> None:
     rng = np.random.default_rng(5)
@@ -243,7 +249,7 @@ def test_accuracy_from_few_pixels(
     assert max(reads) <= most
 
 
-def test_the_searches_cost_less_in_the_order_expected(meter: Meter) -> None:
+def test_sample_searches_cost_less_than_the_full_scan(meter: Meter) -> None:
     picture = earth(5, 5)
     meter.charge(scan_byte=FULL_SIZE.scan_clocks)
     edges_in(picture, meter)
@@ -259,7 +265,7 @@ def test_the_searches_cost_less_in_the_order_expected(meter: Meter) -> None:
     assert cycles[0] > 1.5 * cycles[1] > 1.9 * cycles[2]
 
 
-def test_an_area_includes_its_ends(meter: Meter) -> None:
+def test_mask_area_includes_its_boundary_pixels(meter: Meter) -> None:
     x, y = np.meshgrid(np.arange(20), np.arange(20))
     inside = masked(x.ravel(), y.ravel(), [Mask(3, 5, 7, 8)], meter).reshape(20, 20)
     expected = np.zeros((20, 20), bool)
@@ -267,13 +273,13 @@ def test_an_area_includes_its_ends(meter: Meter) -> None:
     assert (inside == expected).all()
 
 
-def test_an_area_of_zeros_is_none(meter: Meter) -> None:
+def test_all_zero_mask_area_is_unused_and_costs_nothing(meter: Meter) -> None:
     origin = np.zeros(1, np.int64)
     assert not masked(origin, origin, [Mask()] * 5, meter).any()
     assert meter.counts["i16_add"] == 0
 
 
-def test_areas_add_up(meter: Meter) -> None:
+def test_masks_combine_as_a_union(meter: Meter) -> None:
     at = np.arange(10)
     inside = masked(at, at, [Mask(1, 2, 0, 9), Mask(), Mask(8, 9, 0, 9)], meter)
     assert np.flatnonzero(inside).tolist() == [1, 2, 8, 9]

@@ -48,38 +48,38 @@ def errors(
     return np.array(found)
 
 
-def test_the_goal_for_a_full_earth(ours: NadirConfig) -> None:
+def test_nadir_error_meets_its_goal_for_a_full_earth(ours: NadirConfig) -> None:
     error = errors(ours, EdgeConfig(), 0, 30, 40)
     mean, sigma = np.abs(error).mean(axis=0), error.std(axis=0)
     assert mean.max() < 0.03  # the goal is 0.12
     assert sigma.max() < 0.03  # the goal is 0.18
 
 
-def test_a_partial_earth(ours: NadirConfig) -> None:
+def test_nadir_error_of_a_partial_earth_is_below_0_2_deg(ours: NadirConfig) -> None:
     assert np.abs(errors(ours, EdgeConfig(), 35, 80, 30)).max() < 0.2
 
 
 @pytest.mark.parametrize("altitude_km", [300, 750, 1500, 4000])
-def test_the_radius_is_that_of_the_altitude(ours: NadirConfig, altitude_km: float) -> None:
+def test_earth_radius_follows_the_altitude(ours: NadirConfig, altitude_km: float) -> None:
     result = measure(earth(8, -3, altitude_km), ours)
     assert result.detect is DetectResult.SUCCESS
     assert result.radius_deg == pytest.approx(angular_radius_deg(altitude_km), abs=0.15)
     assert error_deg((result.alpha / 100, result.beta / 100), (8, -3)) < 0.05
 
 
-def test_angles_are_the_centre_at_2_9_px_a_degree(ours: NadirConfig) -> None:
+def test_angles_are_the_centre_at_2_9_px_per_degree(ours: NadirConfig) -> None:
     result = measure(earth(-21.7, 13.3), ours)
     assert result.alpha == int(result.x / 2.9)
     assert result.beta == int(result.y / 2.9)
 
 
-def test_a_radius_that_no_altitude_has(ours: NadirConfig) -> None:
+def test_earth_radius_of_9000_km_altitude_is_a_bad_fit(ours: NadirConfig) -> None:
     result = measure(earth(0, 0, altitude_km=9000), ours)
     assert result.detect is DetectResult.BAD_FIT
     assert result.radius_deg == pytest.approx(angular_radius_deg(9000), abs=0.2)
 
 
-def test_without_a_circle_all_edges_are_dropped(
+def test_all_edges_are_dropped_when_no_circle_is_found(
     ours: NadirConfig, published: NadirConfig, meter: Meter
 ) -> None:
     line = np.zeros((ROWS, COLUMNS), np.uint8)
@@ -92,7 +92,7 @@ def test_without_a_circle_all_edges_are_dropped(
     assert measure(line, published, whole_pixels).detect is DetectResult.BAD_FIT
 
 
-def test_a_few_false_edges_are_dropped(ours: NadirConfig) -> None:
+def test_fit_drops_two_false_edges_of_a_dead_pixel(ours: NadirConfig) -> None:
     picture = earth(10, 5)
     clean = measure(picture, ours)
     picture[271, 511] = 255  # bright anyway
@@ -119,7 +119,7 @@ def test_most_edges_may_be_false_but_not_nearly_all(ours: NadirConfig) -> None:
 
 
 @pytest.mark.parametrize("turn_deg", range(0, 360, 45))
-def test_half_a_limb_is_enough(ours: NadirConfig, turn_deg: int) -> None:
+def test_nadir_is_found_from_half_a_limb(ours: NadirConfig, turn_deg: int) -> None:
     """The Sun beside the Earth: light falls off to nothing at the middle of the disc."""
     truth, turn = (10.0, 5.0), np.radians(turn_deg)
     x, y = place(*truth, NADIR_BORESIGHT)
@@ -166,7 +166,7 @@ def test_disturbances_never_move_an_accepted_result(ours: NadirConfig, lit_deg: 
     assert np.mean(inside) > 0.97
 
 
-def test_a_short_arc_is_less_sure_towards_its_middle(ours: NadirConfig) -> None:
+def test_sigma_of_a_short_arc_is_larger_towards_its_middle(ours: NadirConfig) -> None:
     """The centre of a limb that is seen on one side may lie nearer or farther, not beside it."""
     picture = earth(60, 0)
     result = measure(picture, ours, EdgeConfig(sharp=True))
@@ -176,7 +176,7 @@ def test_a_short_arc_is_less_sure_towards_its_middle(ours: NadirConfig) -> None:
     assert result.reason is whole.reason is Reason.MEASURED
 
 
-def test_phases_are_charged(ours: NadirConfig, meter: Meter) -> None:
+def test_nadir_fit_charges_its_phases(ours: NadirConfig, meter: Meter) -> None:
     edges = edges_in(earth(0, 0), meter)
     find_nadir(edges, ours, meter)
     assert set(meter.phases) == {"undistort", "fit"}
@@ -184,7 +184,7 @@ def test_phases_are_charged(ours: NadirConfig, meter: Meter) -> None:
 
 
 @pytest.mark.parametrize("turn", [0, 90, 180, 270])
-def test_a_centre_beyond_the_interface_is_a_bad_fit(ours: NadirConfig, turn: int) -> None:
+def test_nadir_beyond_the_range_of_the_interface_is_a_bad_fit(ours: NadirConfig, turn: int) -> None:
     for tilt in (98.0, 101.0, 104.0, 112.0):
         truth = (tilt * np.cos(np.radians(turn)), tilt * np.sin(np.radians(turn)))
         result = measure(earth(*truth), ours)

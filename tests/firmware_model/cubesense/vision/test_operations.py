@@ -63,7 +63,9 @@ def of_edges(edges: EdgeList) -> list[int]:
 
 @pytest.mark.parametrize("search", SEARCHES)
 @pytest.mark.parametrize("picture", PICTURES)
-def test_edges(meter: Meter, picture: str, search: str) -> None:
+def test_edge_search_charges_the_recorded_operations(
+    meter: Meter, picture: str, search: str
+) -> None:
     edges = edges_in(PICTURES[picture], meter, SEARCHES[search])
     edges.offsets()
     as_on_record(f"edges: {picture}, {search}", meter, of_edges(edges))
@@ -72,7 +74,9 @@ def test_edges(meter: Meter, picture: str, search: str) -> None:
 @pytest.mark.parametrize("sharp", [False, True])
 @pytest.mark.parametrize("between", Between)
 @pytest.mark.parametrize("picture", PICTURES)
-def test_samples(meter: Meter, picture: str, between: Between, sharp: bool) -> None:
+def test_sample_search_charges_the_recorded_operations(
+    meter: Meter, picture: str, between: Between, sharp: bool
+) -> None:
     pixels = PICTURES[picture]
     config = EdgeConfig(sharp=sharp)
     search = around_samples(config, meter, between)
@@ -83,7 +87,9 @@ def test_samples(meter: Meter, picture: str, between: Between, sharp: bool) -> N
 @pytest.mark.parametrize("checked", [False, True])
 @pytest.mark.parametrize("projection", Projection)
 @pytest.mark.parametrize("picture", PICTURES)
-def test_nadir(meter: Meter, picture: str, projection: Projection, checked: bool) -> None:
+def test_nadir_fit_charges_the_recorded_operations(
+    meter: Meter, picture: str, projection: Projection, checked: bool
+) -> None:
     found = edges_in(PICTURES[picture], meter, SEARCHES["sharp"])
     config = NadirConfig(table(projection), projection, checked=checked)
     result = numbers(find_nadir(found, config, meter))
@@ -92,7 +98,9 @@ def test_nadir(meter: Meter, picture: str, projection: Projection, checked: bool
 
 @pytest.mark.parametrize("printed", [False, True])
 @pytest.mark.parametrize("light", LIGHTS)
-def test_sun(meter: Meter, light: str, printed: bool) -> None:
+def test_sun_search_charges_the_recorded_operations(
+    meter: Meter, light: str, printed: bool
+) -> None:
     *centre, bloom_px = LIGHTS[light]
     config = SunConfig(table(Projection.EQUIDISTANT), printed=printed)
     result = numbers(find_sun(window(sun(np.array(centre), bloom_px)), config, meter))
@@ -100,25 +108,27 @@ def test_sun(meter: Meter, light: str, printed: bool) -> None:
 
 
 @pytest.mark.parametrize("printed", [False, True])
-def test_no_sun(meter: Meter, printed: bool) -> None:
+def test_sun_search_in_darkness_charges_the_recorded_operations(
+    meter: Meter, printed: bool
+) -> None:
     config = SunConfig(table(Projection.EQUIDISTANT), printed=printed)
     result = numbers(find_sun(window(PICTURES["dark"]), config, meter))
     as_on_record(f"Sun: none, printed {printed}", meter, result)
 
 
 @pytest.mark.parametrize("name", ["bytes", *(projection.name for projection in Projection)])
-def test_tables(meter: Meter, name: str) -> None:
+def test_distortion_tables_charge_the_recorded_operations(meter: Meter, name: str) -> None:
     made = byte_table(meter) if name == "bytes" else fine_table(meter, Projection[name])
     as_on_record(f"table: {name}", meter, made.differences.tolist(), 1)
 
 
 @pytest.mark.parametrize("slope", [0.0, 0.3, 1.0])
-def test_lens_check(meter: Meter, slope: float) -> None:
+def test_lens_check_charges_the_recorded_operations(meter: Meter, slope: float) -> None:
     found = invertible([DISTORTION[0], slope, *DISTORTION[2:]], meter)
     as_on_record(f"lens check: {slope}", meter, [found])
 
 
-def test_listed_circle(meter: Meter) -> None:
+def test_circle_fit_of_the_listing_charges_the_recorded_operations(meter: Meter) -> None:
     rng = np.random.default_rng(3)
     angles = rng.uniform(0, 2 * np.pi, 9)
     points = np.column_stack([40 + 90 * np.cos(angles), 90 * np.sin(angles) - 20])
@@ -168,21 +178,23 @@ def test_sun_time_depends_on_the_number_of_its_pixels(published_sun: SunConfig) 
     assert times == pytest.approx([0.0646, 0.0720, 0.0835], abs=2e-4)
 
 
-def test_a_sun_of_7_px_has_the_pixels_of_the_fit(published_sun: SunConfig, meter: Meter) -> None:
+def test_sun_of_7_px_covers_the_published_mean_of_109_pixels(
+    published_sun: SunConfig, meter: Meter
+) -> None:
     rng = np.random.default_rng(2)
     places = np.array(SUN_BORESIGHT) + rng.uniform(0, 1, (30, 2))
     counts = [find_sun(window(sun(at, 7)), published_sun, meter).pixels for at in places]
     assert np.mean(counts) == pytest.approx(109, rel=0.05)
 
 
-def test_the_nadir_time(published: NadirConfig) -> None:
+def test_predicted_nadir_time_matches_the_published_245_ms(published: NadirConfig) -> None:
     whole_pixels = EdgeConfig(sub_pixel=False)
     predicted = IMAGING_S + nadir_seconds(published, whole_pixels)
     # Published are 245 ms.
     assert predicted == pytest.approx(0.2456, abs=0.002)
 
 
-def test_ours_takes_longer(
+def test_extended_nadir_fit_takes_0_1_to_0_2_s_longer(
     published_sun: SunConfig,
     published: NadirConfig,
     equidistant: RadiusTable,

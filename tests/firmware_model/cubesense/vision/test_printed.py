@@ -113,7 +113,7 @@ def lookup(meter: Meter) -> list[int]:
 )
 @pytest.mark.parametrize("gateware", ["as-flown", "corrected"])
 @pytest.mark.parametrize("seed", range(2))
-def test_edges(
+def test_edge_search_matches_the_published_listing(
     meter: Meter, seed: int, gateware: str, listing: bool, rim: tuple[int, int], last: int
 ) -> None:
     read_out = READ_OUTS[gateware]
@@ -127,7 +127,7 @@ def test_edges(
         assert (edges.points // 32).tolist() == expected[:MAX_EDGES]
 
 
-def test_gateware_and_program_as_flown_are_right_together(meter: Meter) -> None:
+def test_as_flown_gateware_and_program_offsets_cancel(meter: Meter) -> None:
     """The 1 of the program and the start columns of the gateware cancel.
 
     Not as printed, where a bright line that ends with a sample, another one here, ends late.
@@ -142,7 +142,9 @@ def test_gateware_and_program_as_flown_are_right_together(meter: Meter) -> None:
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_nadir(meter: Meter, published: nadir.NadirConfig, lookup: list[int], seed: int) -> None:
+def test_nadir_fit_equals_the_printed_listing(
+    meter: Meter, published: nadir.NadirConfig, lookup: list[int], seed: int
+) -> None:
     rng = np.random.default_rng(seed)
     alpha, beta = rng.uniform(-35, 35, 2)
     edges = edges_in(earth(alpha, beta, rng=rng), meter, EdgeConfig(sub_pixel=False))
@@ -152,7 +154,7 @@ def test_nadir(meter: Meter, published: nadir.NadirConfig, lookup: list[int], se
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_sun(meter: Meter, lookup: list[int], seed: int) -> None:
+def test_sun_search_equals_the_printed_listing(meter: Meter, lookup: list[int], seed: int) -> None:
     rng = np.random.default_rng(seed)
     centre, bloom = rng.uniform((229, 110), (509, 390)), float(rng.uniform(3, 9))
     data = window(sun(centre, bloom, rng, flat=bool(seed % 2)))
@@ -161,7 +163,9 @@ def test_sun(meter: Meter, lookup: list[int], seed: int) -> None:
     assert [found.x, found.y] == calc_sun([int(byte) for byte in data], lookup)
 
 
-def test_costs_equal_the_listing_s_operations(meter: Meter, published: nadir.NadirConfig) -> None:
+def test_nadir_fit_charges_the_operations_of_the_printed_listing(
+    meter: Meter, published: nadir.NadirConfig
+) -> None:
     edges = edges_in(earth(3, -8), meter, EdgeConfig(sub_pixel=False))
     n, before = len(edges), Counter(meter.counts)
     nadir.find_nadir(edges, published, meter)
@@ -178,7 +182,9 @@ def test_costs_equal_the_listing_s_operations(meter: Meter, published: nadir.Nad
 
 @pytest.mark.parametrize("first", [(100, 1, 200, 0), (139, 0, 247, 0)], ids=["stuck", "outside"])
 @pytest.mark.parametrize(("printed", "detect"), [(False, "SUN_NOT_FOUND"), (True, "SUCCESS")])
-def test_any_sun_pixel(meter: Meter, printed: bool, detect: str, first: tuple[int, ...]) -> None:
+def test_sun_search_skips_stuck_and_outside_pixels_unless_as_printed(
+    meter: Meter, printed: bool, detect: str, first: tuple[int, ...]
+) -> None:
     config = sun_centroid.SunConfig(byte_table(meter), printed=printed)
     data = np.zeros(sun_centroid.window_bytes(), np.uint8)
     data[:4], data[100] = first, 230

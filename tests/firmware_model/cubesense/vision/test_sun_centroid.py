@@ -31,13 +31,15 @@ def p95(config: SunConfig, bloom_px: float, low_deg: float, high_deg: float) -> 
 
 
 @pytest.mark.parametrize("bloom_px", [5, 6, 7])
-def test_the_goal(ours: SunConfig, bloom_px: float) -> None:
+def test_sun_error_meets_its_goal(ours: SunConfig, bloom_px: float) -> None:
     assert p95(ours, bloom_px, 0, 45) < 0.13  # the goal is 0.2
     assert p95(ours, bloom_px, 45, 90) < 0.13  # the goal is 2
 
 
 @pytest.mark.parametrize("bloom_px", [4.0, 5.0, 6.0])
-def test_disc_with_sharp_edge_is_uncertain(ours: SunConfig, meter: Meter, bloom_px: float) -> None:
+def test_sun_disc_with_sharp_edge_has_a_large_sigma(
+    ours: SunConfig, meter: Meter, bloom_px: float
+) -> None:
     """A flat Sun, or structure: the usual image fades over more than a pixel."""
     truth = (20.0, -13.0)
     picture = sun(place(*truth, SUN_BORESIGHT), bloom_px, flat=True)
@@ -47,7 +49,7 @@ def test_disc_with_sharp_edge_is_uncertain(ours: SunConfig, meter: Meter, bloom_
     assert result.sigma_alpha == result.sigma_beta == 4800
 
 
-def test_the_sun_has_a_standard_deviation_and_a_reason(ours: SunConfig, meter: Meter) -> None:
+def test_sun_result_has_sigma_and_reason_unless_as_printed(ours: SunConfig, meter: Meter) -> None:
     data = window(sun(np.array([300.3, 200.6]), 6))
     result = find_sun(data, ours, meter)
     assert result.reason is Reason.MEASURED
@@ -56,7 +58,9 @@ def test_the_sun_has_a_standard_deviation_and_a_reason(ours: SunConfig, meter: M
     assert (printed.reason, printed.sigma_alpha) == (Reason.NONE, 0)
 
 
-def test_the_mean_is_weighted_from_the_boresight(equidistant: RadiusTable, meter: Meter) -> None:
+def test_sun_centroid_is_the_weighted_mean_from_the_boresight(
+    equidistant: RadiusTable, meter: Meter
+) -> None:
     picture = np.zeros((ROWS, COLUMNS), np.uint8)
     picture[250, 369:372] = 240
     picture[251, 371] = 225
@@ -70,7 +74,9 @@ def test_the_mean_is_weighted_from_the_boresight(equidistant: RadiusTable, meter
     assert result.alpha == int(np.float32(result.x) / np.float32(2.9))
 
 
-def test_an_uncut_sun_has_the_published_mean(equidistant: RadiusTable, meter: Meter) -> None:
+def test_uncut_sun_has_the_same_centroid_with_and_without_printed_mode(
+    equidistant: RadiusTable, meter: Meter
+) -> None:
     data = window(sun(np.array([200.3, 300.6]), 5))
     both = [
         find_sun(data, SunConfig(equidistant, printed=printed), meter) for printed in (False, True)
@@ -95,7 +101,7 @@ def bright(*places: tuple[slice, slice]) -> NDArray[np.uint8]:
     ],
     ids=["pair of stuck pixels", "row of stuck pixels", "reflection below the threshold"],
 )
-def test_rejects_lights_that_are_not_the_sun(
+def test_sun_search_rejects_lights_that_are_not_the_sun(
     ours: SunConfig, meter: Meter, picture: NDArray[np.uint8], pixels: int
 ) -> None:
     result = find_sun(window(picture), ours, meter)
@@ -164,7 +170,7 @@ def test_each_rejection_reason_has_an_example(
     assert (result.detect is DetectResult.SUCCESS) == (reason is Reason.SHARP)
 
 
-def test_half_of_the_pixels_must_be_saturated(ours: SunConfig, meter: Meter) -> None:
+def test_sun_needs_half_of_its_pixels_saturated(ours: SunConfig, meter: Meter) -> None:
     for saturated, reason in ((40, Reason.SHARP), (39, Reason.NOT_SATURATED)):
         data = squares(8, 10, level=230)
         pixels = data[4:]
@@ -181,7 +187,7 @@ def test_masked_pixels_do_not_count(ours: SunConfig, meter: Meter) -> None:
 
 @pytest.mark.parametrize(("distance", "found"), [(224.0, True), (229.0, False)])
 @pytest.mark.parametrize("turn", np.arange(0, 2 * np.pi, 0.7))
-def test_light_beyond_the_rim_of_the_field_is_no_sun(
+def test_light_beyond_the_field_rim_is_not_the_sun(
     ours: SunConfig, meter: Meter, distance: float, found: bool, turn: float
 ) -> None:
     centre = np.array(SUN_BORESIGHT) + distance * np.array([np.cos(turn), np.sin(turn)])
@@ -199,14 +205,14 @@ def test_no_lens_gives_an_angle_out_of_range(meter: Meter, slope: float, found: 
     assert result.alpha == (pytest.approx(-100 * 215 / slope / 2.9, abs=20) if found else 0)
 
 
-def test_no_angle_is_beyond_the_field_wherever_the_light_is(ours: SunConfig, meter: Meter) -> None:
+def test_sun_angle_is_within_the_field_for_any_light(ours: SunConfig, meter: Meter) -> None:
     for x in range(10, COLUMNS, 90):
         for y in range(10, ROWS, 65):
             result = find_sun(window(sun(np.array([x, y], float), 5)), ours, meter)
             assert np.hypot(result.alpha, result.beta) < 9700
 
 
-def test_rejects_other_lengths(ours: SunConfig, meter: Meter) -> None:
+def test_sun_search_rejects_windows_of_other_lengths(ours: SunConfig, meter: Meter) -> None:
     assert window_bytes() == 229
     with pytest.raises(ValueError, match="229 bytes, not"):
         find_sun(np.zeros(228, np.uint8), ours, meter)

@@ -9,7 +9,7 @@ from cubestack.firmware_model.star_tracker.regions import Runs
 
 
 @pytest.mark.parametrize("seed", range(10))
-def test_areas_have_the_brightest_of_their_pixels(seed: int) -> None:
+def test_areas_report_size_and_brightest_pixel(seed: int) -> None:
     rng = np.random.default_rng(seed)
     height, width = (int(size) for size in rng.integers(5, 60, 2))
     mask = rng.random((height, width)) < rng.uniform(0.05, 0.7)
@@ -26,7 +26,7 @@ def test_areas_have_the_brightest_of_their_pixels(seed: int) -> None:
         assert found.tops[area] == own.max() == signal.reshape(-1)[found.peaks[area]]
 
 
-def test_a_long_run_makes_its_area_large() -> None:
+def test_run_longer_than_the_limit_marks_its_area_as_large() -> None:
     mask = np.zeros((8, 100), np.bool_)
     mask[2, 3 : 3 + areas.LONGEST_RUN] = True
     mask[5, 3 : 4 + areas.LONGEST_RUN] = True
@@ -37,7 +37,7 @@ def test_a_long_run_makes_its_area_large() -> None:
     assert found.sizes.tolist() == [areas.LONGEST_RUN, 1]
 
 
-def test_where_all_runs_are_long_the_places_are_in_the_areas() -> None:
+def test_peaks_of_areas_with_only_long_runs_are_inside_them() -> None:
     mask = np.zeros((8, 100), np.bool_)
     mask[2, 3:90] = mask[5:7, 20:80] = True
     runs = Runs.of(mask)
@@ -50,7 +50,9 @@ def test_where_all_runs_are_long_the_places_are_in_the_areas() -> None:
 @pytest.mark.parametrize(
     ("beside", "sharp"), [((0, 0, 0, 0), True), ((15, 15, 10, 10), True), ((20, 20, 20, 20), False)]
 )
-def test_a_spike_stands_alone(beside: tuple[int, int, int, int], sharp: bool) -> None:
+def test_bright_pixel_is_a_spike_only_without_bright_neighbours(
+    beside: tuple[int, int, int, int], sharp: bool
+) -> None:
     picture = np.full((5, 5), 7, np.uint8)
     picture[2, 2] += 100
     for (dy, dx), value in zip(((-1, 0), (1, 0), (0, -1), (0, 1)), beside, strict=True):

@@ -62,7 +62,7 @@ def test_stars_without_noise_are_more_accurate_than_published(kind: str, seed: i
 
 
 @pytest.mark.parametrize("level", [1, 20, 90])
-def test_a_constant_moves_nothing(level: int) -> None:
+def test_constant_background_does_not_shift_centroids(level: int) -> None:
     image, _ = sky(1)
     dark, bright = search(taken(image)), search(taken(image + level))
     away = np.abs(errors(dark, bright.centroids.astype(float)))
@@ -72,7 +72,7 @@ def test_a_constant_moves_nothing(level: int) -> None:
 
 
 @pytest.mark.parametrize("turn", [0.0, 1.0, 2.5])
-def test_a_gradient_moves_hardly_anything(turn: float) -> None:
+def test_background_gradient_shifts_centroids_by_less_than_0_02_px(turn: float) -> None:
     image, places = sky(2)
     ramp = np.cos(turn) * X / 1024 + np.sin(turn) * Y / 512
     found = search(taken(image + 60 * (ramp - ramp.min()) / np.ptp(ramp) + 0.5))
@@ -81,7 +81,7 @@ def test_a_gradient_moves_hardly_anything(turn: float) -> None:
     assert told(found).background_range == pytest.approx(60, abs=5)
 
 
-def test_a_turned_picture_has_the_turned_stars() -> None:
+def test_stars_of_a_rotated_image_are_the_rotated_stars() -> None:
     image, _ = sky(3)
     picture = taken(image + np.random.default_rng(3).normal(10, 1, image.shape))
     one, other = search(picture), search(picture[::-1, ::-1].copy())
@@ -92,7 +92,7 @@ def test_a_turned_picture_has_the_turned_stars() -> None:
     assert np.median(away) < 0.01
 
 
-def test_the_brightest_are_kept_wherever_they_are() -> None:
+def test_brightest_stars_are_kept_wherever_they_are() -> None:
     image, places = sky(4, 50)
     for setting, kept in ((20, 40), (6, 12)):
         found = detect_stars(taken(image), replace(CONFIG, max_stars=setting), meter())
@@ -100,7 +100,7 @@ def test_the_brightest_are_kept_wherever_they_are() -> None:
         assert missing(found, places[: kept - 3]) == 0
 
 
-def test_stars_in_noise_are_as_far_off_as_expected() -> None:
+def test_centroid_errors_in_noise_match_their_sigma() -> None:
     pulls = []
     for seed in range(6):
         image, places = sky(seed)
@@ -117,7 +117,7 @@ def test_stars_in_noise_are_as_far_off_as_expected() -> None:
 
 
 @pytest.mark.parametrize(("sigmas", "fewest", "most"), [(3.0, 0, 2), (4.5, 15, 18)])
-def test_areas_count_from_four_sigmas_on(sigmas: float, fewest: int, most: int) -> None:
+def test_areas_are_detected_above_four_sigma(sigmas: float, fewest: int, most: int) -> None:
     image = np.random.default_rng(14).normal(60, 4, (512, 1024))
     _, places = sky(14)
     for x, y in places.astype(int):
@@ -127,7 +127,7 @@ def test_areas_count_from_four_sigmas_on(sigmas: float, fewest: int, most: int) 
     assert fewest <= len(places) - missing(search(taken(image)), places, 1.0) <= most
 
 
-def test_twenty_thousand_hot_pixels_hide_no_bright_star_and_make_few() -> None:
+def test_hot_pixels_hide_no_bright_star_and_add_few() -> None:
     image, places = sky(5)
     rng = np.random.default_rng(5)
     hot = rng.choice(image.size, 20_000, replace=False)
@@ -167,7 +167,7 @@ def test_recognises_star_streaks_by_their_common_direction() -> None:
 
 # The Moon with its glare saturates 7.9 px and more; a disc of 5 px so near glare is like a star.
 @pytest.mark.parametrize("radius", [4.0, 8.0, 20.0, 70.0])
-def test_a_disc_is_one_large_area_and_the_search_goes_on(radius: float) -> None:
+def test_bright_disc_is_rejected_and_the_stars_around_it_are_found(radius: float) -> None:
     image, places = sky(8)
     away = np.hypot(X - 500, Y - 250)
     image += np.where(away < radius, 5000, 300 / (1 + (away / radius) ** 3))
@@ -178,7 +178,7 @@ def test_a_disc_is_one_large_area_and_the_search_goes_on(radius: float) -> None:
     assert np.hypot(*(found.centroids - [500, 250]).T).min() > radius
 
 
-def test_half_a_picture_of_light_leaves_the_other_half() -> None:
+def test_stars_are_found_beside_a_saturated_half_image() -> None:
     image, places = sky(9)
     image[:, 500:] = 4000
     found = search(taken(image))
@@ -206,7 +206,7 @@ def hard_pictures() -> dict[str, Picture]:
 
 
 @pytest.mark.parametrize("name", list(hard_pictures()))
-def test_no_picture_takes_longer_than_it_may(name: str) -> None:
+def test_background_search_stays_within_its_time_limit(name: str) -> None:
     own = meter()
     found = search(hard_pictures()[name], own)
     assert own.table.seconds(own.total) < 0.225
@@ -218,7 +218,7 @@ def test_no_picture_takes_longer_than_it_may(name: str) -> None:
         assert (len(found.centroids), found.end) == (0, SearchEnd.COMPLETE)
 
 
-def test_what_is_out_of_time_is_below_and_not_reported() -> None:
+def test_search_out_of_time_reports_only_the_upper_rows() -> None:
     image, _ = sky(11)
     image[200:] += np.where(np.random.default_rng(11).random((312, 1024)) < 0.25, 20, 0)
     found = search(taken(image))
@@ -227,7 +227,7 @@ def test_what_is_out_of_time_is_below_and_not_reported() -> None:
     assert found.centroids[:, 1].max() < 300
 
 
-def test_only_the_region_is_searched() -> None:
+def test_detection_searches_only_the_configured_region() -> None:
     image, places = sky(12)
     config = replace(CONFIG, x_start=200, x_end=700, y_start=100, y_end=400)
     own = meter()
@@ -240,14 +240,14 @@ def test_only_the_region_is_searched() -> None:
 
 
 @pytest.mark.parametrize("light", [300.0, 900.0])
-def test_stars_a_pixel_from_a_border_are_where_they_are(light: float) -> None:
+def test_stars_one_pixel_from_the_border_are_located_exactly(light: float) -> None:
     places = np.array([(300, 1), (1, 250), (700, 510), (1022, 255)], np.float64)
     found = search(taken(spots(places, np.full(4, light))))
     assert len(found.centroids) == 4
     assert np.abs(errors(found, places)).max() < 0.02
 
 
-def test_faint_and_small_stars_fill_the_list_only_where_there_is_room() -> None:
+def test_faint_stars_fill_only_the_free_places_of_the_list() -> None:
     rng = np.random.default_rng(13)
     bright, places = sky(13, 45, 600.0)
     faint = rng.uniform(20, 490, (30, 2)) * [2, 1]

@@ -143,7 +143,7 @@ def test_search_follows_the_literal_rules(seed: int) -> None:
     assert found.errors_px.shape == (0,)  # this search does not know
 
 
-def test_the_random_pictures_reach_every_end() -> None:
+def test_random_images_reach_every_end_of_the_search() -> None:
     ends = set()
     for seed in range(40):
         image = crowded(np.random.default_rng(seed), 50, 50)
@@ -167,7 +167,7 @@ def test_eighteen_noise_free_stars_are_as_accurate_as_published(kind: str, seed:
     assert error_y <= 0.0427
 
 
-def test_a_bright_uneven_background_hardly_moves_a_centroid() -> None:
+def test_bright_noisy_background_shifts_centroids_by_less_than_0_15_px() -> None:
     rng = np.random.default_rng(2)
     image, true = drawn("integrated", rng, background=30.0)
     image = np.clip(image + rng.normal(0, 1.5, image.shape), 0, 255).astype(np.uint8)
@@ -188,13 +188,13 @@ def test_a_saturated_star_is_centred_on_its_plateau() -> None:
     assert found.centroids[0] == pytest.approx([30.3, 28.8], abs=0.1)
 
 
-def test_a_field_full_of_light_ends_after_fifty_one_invalid_areas() -> None:
+def test_search_of_a_saturated_image_ends_after_51_invalid_areas() -> None:
     found = detect_stars(np.full((512, 1024), 255, dtype=np.uint8), DetectionConfig(), meter())
     assert (found.invalid, len(found.centroids)) == (51, 0)
     assert found.end is SearchEnd.INVALID
 
 
-def test_every_ninth_pixel_is_read_and_twice_the_stars_cost_twice_the_growing() -> None:
+def test_sampled_search_reads_every_ninth_pixel_and_costs_grow_with_stars() -> None:
     rng = np.random.default_rng(3)
     empty, few, many = meter(), meter(), meter()
     detect_stars(np.zeros((512, 1024), dtype=np.uint8), DetectionConfig(), empty)

@@ -37,7 +37,7 @@ def test_a_spot_without_noise_is_found_to_a_hundredth_of_a_pixel(sigma: float) -
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("light", "noise"), [(300.0, 1.0), (300.0, 4.0), (1000.0, 4.0)])
-def test_the_expected_error_is_the_true_one(light: float, noise: float) -> None:
+def test_reported_centroid_error_matches_the_true_error(light: float, noise: float) -> None:
     signal, places = windows(np.random.default_rng(2), 800, light, noise)
     measured = found(signal, noise, 0.945)
     pulls = (measured.places - places) / measured.errors[:, None]
@@ -45,7 +45,7 @@ def test_the_expected_error_is_the_true_one(light: float, noise: float) -> None:
     assert np.abs(pulls.mean(axis=0)).max() < 0.1
 
 
-def test_a_hot_pixel_moves_a_centroid_less_than_it_is_said_to() -> None:
+def test_hot_pixel_shifts_a_centroid_less_than_its_reported_error() -> None:
     signal, places = windows(np.random.default_rng(3), 300, 500.0, 0.3)
     signal[:, spots.HALF + 1, spots.HALF - 2] += 16 * 60
     measured = found(signal, 0.3, 0.945)
@@ -56,7 +56,7 @@ def test_a_hot_pixel_moves_a_centroid_less_than_it_is_said_to() -> None:
 
 
 @pytest.mark.parametrize("sigma", [0.6, 0.9, 1.4])
-def test_the_width_of_the_spots_is_measured(sigma: float) -> None:
+def test_spot_width_is_measured(sigma: float) -> None:
     rng = np.random.default_rng(4)
     signal, _ = windows(rng, 20, 1500.0, 0.3, sigma)
     few = np.zeros(20, np.bool_)
@@ -65,7 +65,7 @@ def test_the_width_of_the_spots_is_measured(sigma: float) -> None:
     assert np.all(star)
 
 
-def test_narrow_and_wide_spots_are_doubtful() -> None:
+def test_spots_of_unusual_width_are_rejected() -> None:
     rng = np.random.default_rng(5)
     kinds = [windows(rng, 12, 900.0, 0.3), windows(rng, 5, 500.0, 0.3, 0.4)]
     kinds.append(windows(rng, 3, 600.0, 0.3, 2.2))
@@ -75,7 +75,7 @@ def test_narrow_and_wide_spots_are_doubtful() -> None:
     assert star.tolist() == [True] * 12 + [False] * 8
 
 
-def test_a_lone_pixel_is_too_sharp() -> None:
+def test_single_bright_pixel_is_rejected_as_too_sharp() -> None:
     signal, _ = windows(np.random.default_rng(6), 5, 300.0, 0.3)
     lone = np.zeros((1, 9, 9), np.int64)
     lone[0, 4, 4], lone[0, 4, 5] = 3000, 300

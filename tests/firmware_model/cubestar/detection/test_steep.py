@@ -46,7 +46,7 @@ def noisy(image: NDArray[np.float64], seed: int) -> NDArray[np.float64]:
 
 
 @pytest.mark.parametrize("other", range(10, 15))
-def test_a_level_is_that_just_beyond_a_spot_on_both_sides_rounded_half_up(other: int) -> None:
+def test_background_of_a_spot_is_the_mean_level_beside_it_rounded_half_up(other: int) -> None:
     away = HALF + 1
     picture = np.zeros((9, 32), np.uint8)
     picture[4, [16 - away, 16, 16 + away]] = 10, 200, other
@@ -57,7 +57,7 @@ def test_a_level_is_that_just_beyond_a_spot_on_both_sides_rounded_half_up(other:
     assert places.levels.tolist() == [UNIT * (10 + (other - 10 + 1) // 2)]
 
 
-def test_other_ways_end_at_the_last_pixels_of_the_picture() -> None:
+def test_background_samples_are_clipped_at_the_image_border() -> None:
     at = np.array([0, 4, 8])
     none = np.zeros(3, np.int64)
     rows, columns = beside(steep.Places(at, at * 4, none, none), 9, 33)
@@ -69,7 +69,7 @@ def test_other_ways_end_at_the_last_pixels_of_the_picture() -> None:
 
 
 @pytest.mark.parametrize("angle_deg", [0, 30, 45, 90, 140, 200, 270, 300])
-def test_stars_beside_the_limb_are_found_and_nothing_else(angle_deg: float) -> None:
+def test_only_stars_are_found_beside_the_limb(angle_deg: float) -> None:
     light, places = limb(angle_deg)
     stars = spots(places, np.full(len(places), 700.0))
     found = detect_stars(taken(noisy(light + stars, angle_deg)), CONFIG, meter())
@@ -80,13 +80,13 @@ def test_stars_beside_the_limb_are_found_and_nothing_else(angle_deg: float) -> N
 
 
 @pytest.mark.parametrize("angle_deg", range(0, 360, 20))
-def test_a_limb_alone_has_no_stars(angle_deg: float) -> None:
+def test_earth_limb_yields_at_most_one_false_star(angle_deg: float) -> None:
     light, _ = limb(angle_deg + 7)
     found = detect_stars(taken(noisy(light, angle_deg)), CONFIG, meter())
     assert len(found.centroids) <= 1
 
 
-def test_what_is_too_bright_is_blind_and_so_is_what_is_outside_of_the_region() -> None:
+def test_saturated_cells_and_cells_outside_the_region_are_blind() -> None:
     light, _ = limb(0)
     picture = taken(noisy(light, 1))
     whole = detect_stars(picture, CONFIG, meter())

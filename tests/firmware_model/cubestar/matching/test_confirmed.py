@@ -37,7 +37,7 @@ def name(tracker: PairTracker) -> Name:
     return identified
 
 
-def test_three_stars_that_fit_two_places_get_no_identity() -> None:
+def test_three_stars_that_match_two_places_are_not_identified() -> None:
     rng = np.random.default_rng(80)
     triple = np.array([[0.1, 0.0, 1], [-0.12, 0.05, 1], [0.02, -0.17, 1]])
     triple /= np.linalg.norm(triple, axis=1, keepdims=True)
@@ -49,7 +49,7 @@ def test_three_stars_that_fit_two_places_get_no_identity() -> None:
     assert identify(rays, None, sky, pinhole(), meter()).outcome is MatchOutcome.AMBIGUOUS
 
 
-def test_the_order_of_the_centroids_does_not_matter(name: Name, shoot: Shoot) -> None:
+def test_identification_does_not_depend_on_the_centroid_order(name: Name, shoot: Shoot) -> None:
     rng = np.random.default_rng(81)
     for _ in range(20):
         shot = shoot(rng, false_stars=8, most=40)
@@ -61,7 +61,7 @@ def test_the_order_of_the_centroids_does_not_matter(name: Name, shoot: Shoot) ->
         assert other.false_alarm == pytest.approx(plain.false_alarm, nan_ok=True)
 
 
-def test_stars_that_were_tried_in_vain_have_votes(name: Name, tracker: PairTracker) -> None:
+def test_rejected_stars_keep_their_votes(name: Name, tracker: PairTracker) -> None:
     """Six false stars: each was one of a triangle of the catalogue, and none is believed."""
     found = name(tracker.false_rays(np.random.default_rng(11), 6))
     assert found.outcome is not MatchOutcome.IDENTIFIED
@@ -69,7 +69,7 @@ def test_stars_that_were_tried_in_vain_have_votes(name: Name, tracker: PairTrack
 
 
 @pytest.mark.parametrize("per_cent", [-3.0, -0.85, -0.35, 0.35, 0.85, 3.0])
-def test_five_stars_suffice_at_3_per_cent(
+def test_five_stars_suffice_at_3_percent_focal_length_error(
     tracker: PairTracker, shoot: Shoot, per_cent: float
 ) -> None:
     """So few are only found where one of the focal lengths that are tried is nearly right."""
@@ -86,7 +86,9 @@ def test_five_stars_suffice_at_3_per_cent(
     assert solved >= 24
 
 
-def test_what_the_result_says(name: Name, shoot: Shoot) -> None:
+def test_identification_result_has_votes_confidence_and_false_alarm(
+    name: Name, shoot: Shoot
+) -> None:
     rng = np.random.default_rng(94)
     shot = next(s for s in (shoot(rng) for _ in range(20)) if 8 <= len(s.stars) <= 19)
     found = name(shot.directions)

@@ -52,7 +52,9 @@ def algorithm_2(directions: NDArray[Any], catalogue: StarCatalogue) -> dict[int,
 
 
 @pytest.mark.parametrize(("false_stars", "seen"), quick([(10, 20), (0, 20), (10, 5), (3, 20)], 2))
-def test_printed_votes(catalogue: StarCatalogue, shoot: Shoot, false_stars: int, seen: int) -> None:
+def test_matching_agrees_with_the_printed_voting_algorithm(
+    catalogue: StarCatalogue, shoot: Shoot, false_stars: int, seen: int
+) -> None:
     rng = np.random.default_rng(false_stars)
     same = 0
     for _ in range(25):
@@ -64,7 +66,7 @@ def test_printed_votes(catalogue: StarCatalogue, shoot: Shoot, false_stars: int,
     assert same >= 24  # an angle at the margin may round either way
 
 
-def test_tracks_what_is_nearest(catalogue: StarCatalogue, shoot: Shoot) -> None:
+def test_printed_tracking_takes_the_nearest_star(catalogue: StarCatalogue, shoot: Shoot) -> None:
     shot = shoot(np.random.default_rng(2), false_stars=0)
     attitude = shot.attitude.astype(np.float32)
     directions = shot.directions.copy()
@@ -80,11 +82,11 @@ def test_tracks_what_is_nearest(catalogue: StarCatalogue, shoot: Shoot) -> None:
     assert 0 not in verified.matched
 
 
-def test_the_cut_holds_a_field_s_radius_and_the_error_of_a_rough_boresight() -> None:
+def test_catalogue_cut_radius_is_field_radius_plus_hint_error() -> None:
     assert CUT_RADIUS_DEG == 30 + 5  # sections 4.3.4, 5.3.4
 
 
-def test_four_of_the_fewest_stars_are_not_needed(catalogue: StarCatalogue) -> None:
+def test_three_matching_stars_suffice_and_two_do_not(catalogue: StarCatalogue) -> None:
     """Three that agree are an identification (section 4.3.5), two are none."""
     near = np.argsort(-catalogue.vectors @ catalogue.vectors[0])[:40]
     for stars in combinations(near.tolist(), 3):

@@ -44,7 +44,9 @@ def solved(results: list[tuple[bool, int]], least: float) -> bool:
 
 
 @pytest.mark.parametrize("turn_deg", [0.0, 0.25])
-def test_tracking_follows(catalogue: StarCatalogue, shoot: Shoot, turn_deg: float) -> None:
+def test_tracking_follows_small_rotations(
+    catalogue: StarCatalogue, shoot: Shoot, turn_deg: float
+) -> None:
     rng = np.random.default_rng(90)
     results = []
     for _ in range(100):
@@ -58,7 +60,7 @@ def test_tracking_follows(catalogue: StarCatalogue, shoot: Shoot, turn_deg: floa
     assert solved(results, 0.99)
 
 
-def test_tracking_loses_a_turn_beyond_its_reach(catalogue: StarCatalogue, shoot: Shoot) -> None:
+def test_tracking_is_lost_beyond_its_reach(catalogue: StarCatalogue, shoot: Shoot) -> None:
     rng = np.random.default_rng(91)
     lost = 0
     for _ in range(40):
@@ -84,7 +86,9 @@ def test_two_stars_suffice_when_two_are_predicted(catalogue: StarCatalogue, shoo
     assert one.outcome is MatchOutcome.TOO_FEW_CENTROIDS
 
 
-def test_a_wrong_attitude_is_not_followed(catalogue: StarCatalogue, shoot: Shoot) -> None:
+def test_tracking_from_a_wrong_attitude_identifies_nothing(
+    catalogue: StarCatalogue, shoot: Shoot
+) -> None:
     rng = np.random.default_rng(93)
     for _ in range(300):
         shot = shoot(rng, false_stars=15, most=40)
@@ -93,7 +97,7 @@ def test_a_wrong_attitude_is_not_followed(catalogue: StarCatalogue, shoot: Shoot
         assert found.outcome is not MatchOutcome.IDENTIFIED
 
 
-def test_tracking_takes_the_nearest_of_several_stars_in_reach() -> None:
+def test_tracking_matches_the_nearest_of_several_stars() -> None:
     places = np.radians([[0.0, 0.0], [0.2, 0.0], [9.0, 3.0], [-8.0, -4.0]])
     stars = np.column_stack([np.tan(places), np.ones(4)])
     stars /= np.linalg.norm(stars, axis=1, keepdims=True)
@@ -103,7 +107,9 @@ def test_tracking_takes_the_nearest_of_several_stars_in_reach() -> None:
     assert found.stars.tolist() == [1, 2, 3]
 
 
-def test_verification_keeps_a_set_that_agrees(catalogue: StarCatalogue, shoot: Shoot) -> None:
+def test_verification_keeps_only_a_consistent_set_of_stars(
+    catalogue: StarCatalogue, shoot: Shoot
+) -> None:
     shot = full_shot(shoot, 93)
     wrong = shot.stars.astype(np.int32)
     wrong[0] = (wrong[0] + 50) % 405
@@ -115,7 +121,7 @@ def test_verification_keeps_a_set_that_agrees(catalogue: StarCatalogue, shoot: S
     assert set(votes[2:].tolist()) == {len(wrong) - 3}
 
 
-def test_the_nearest_star_costs_a_comparison_of_every_pair(catalogue: StarCatalogue) -> None:
+def test_nearest_star_search_charges_every_pair(catalogue: StarCatalogue) -> None:
     """A star is turned: 9 products, 6 sums. A pair: 3 differences, 3 squares, 2 sums, and one
     comparison."""
 

@@ -45,7 +45,7 @@ DARK = np.zeros((512, 1024), np.uint8)
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_a_picture_gives_its_attitude(unit: Harness, seed: int) -> None:
+def test_attitude_from_an_image_is_within_0_005_deg(unit: Harness, seed: int) -> None:
     true = Rotation.random(rng=np.random.default_rng(seed))
     sky = take(unit.catalogue, true)
     values = process(unit, sky.picture)
@@ -56,7 +56,7 @@ def test_a_picture_gives_its_attitude(unit: Harness, seed: int) -> None:
     assert values["Matched"] == unit.telemetry("NumIdStars")["numIdStars"] >= 4
 
 
-def test_the_attitude_belongs_to_the_picture_of_the_stars(lit: Harness) -> None:
+def test_attitude_time_is_that_of_the_image_of_its_stars(lit: Harness) -> None:
     lit.command("CaptureImage", "DetectStars", "IDStars")
     at_ms = lit.now_us / 1000
     lit.command("CaptureImage", "EstimateAttitude")
@@ -65,7 +65,7 @@ def test_the_attitude_belongs_to_the_picture_of_the_stars(lit: Harness) -> None:
     assert values["ImageTime"] < at_ms
 
 
-def test_weights_follow_confirmation(
+def test_quest_weights_follow_the_confirmation(
     unit: Harness, monkeypatch: pytest.MonkeyPatch, pose: Rotation
 ) -> None:
     given: list[np.ndarray] = []
@@ -90,7 +90,7 @@ def test_a_failure_leaves_the_last_attitude_but_not_its_validity(unit: Harness, 
     assert not unit.telemetry("PerformanceParameters")["AttitudeSuccess"]
 
 
-def test_identifying_again_takes_the_validity_back(unit: Harness, sky: Sky) -> None:
+def test_identifying_again_invalidates_the_attitude(unit: Harness, sky: Sky) -> None:
     process(unit, sky.picture)
     unit.command("IDStars")
     assert not unit.telemetry("AttitudeQuaternion")["Valid"]
@@ -108,13 +108,15 @@ def test_identifying_again_takes_the_validity_back(unit: Harness, sky: Sky) -> N
         ("ProcessImage", TaskStatus.DETECTION_FAILED, "StatusError"),
     ],
 )
-def test_a_step_without_its_input(unit: Harness, name: str, failed: TaskStatus, flag: str) -> None:
+def test_processing_step_without_its_input_fails_with_its_flag(
+    unit: Harness, name: str, failed: TaskStatus, flag: str
+) -> None:
     unit.command(name)
     assert unit.status() is failed
     assert unit.flags() == {flag}
 
 
-def test_too_few_stars(unit: Harness, pose: Rotation) -> None:
+def test_too_few_stars_yield_no_attitude(unit: Harness, pose: Rotation) -> None:
     process(unit, DARK)
     assert unit.status() is TaskStatus.DETECTION_FAILED
     assert unit.flags() == {"LessThanThreeStarsDetected"}
@@ -124,7 +126,9 @@ def test_too_few_stars(unit: Harness, pose: Rotation) -> None:
     assert unit.telemetry("DetectionSummary")["NumStarsDetected"] == 2
 
 
-def test_stars_without_attitude(unit: Harness, monkeypatch: pytest.MonkeyPatch, sky: Sky) -> None:
+def test_failed_attitude_estimation_sets_status_and_flag(
+    unit: Harness, monkeypatch: pytest.MonkeyPatch, sky: Sky
+) -> None:
     def refuse(*_arguments: object) -> None:
         raise AttitudeError("the vectors all point the same way")
 
@@ -137,7 +141,7 @@ def test_stars_without_attitude(unit: Harness, monkeypatch: pytest.MonkeyPatch, 
 
 
 @pytest.mark.parametrize("profile", ["extended"])
-def test_lost_in_space_stays_so_when_asked_to(unit: Harness, sky: Sky) -> None:
+def test_commanded_lost_in_space_does_not_change_mode(unit: Harness, sky: Sky) -> None:
     for _ in range(2):
         assert process(unit, sky.picture)["Mode"] == MatchMode.LOST_IN_SPACE
         assert unit.flags() == set()
@@ -152,7 +156,9 @@ def test_tracking_without_attitude_and_hint_starts_lost(tracking: Harness, sky: 
     assert tracking.flags() == set()
 
 
-def test_a_hint_gives_assisted_then_tracking(tracking: Harness, sky: Sky, pose: Rotation) -> None:
+def test_hint_leads_to_assisted_mode_then_tracking(
+    tracking: Harness, sky: Sky, pose: Rotation
+) -> None:
     hint(tracking, pose)
     assert mode_flag(tracking) is MatchMode.ASSISTED
     assert process(tracking, sky.picture)["Mode"] == MatchMode.ASSISTED
@@ -161,7 +167,9 @@ def test_a_hint_gives_assisted_then_tracking(tracking: Harness, sky: Sky, pose: 
 
 
 @pytest.mark.parametrize("profile", ["extended"])
-def test_a_wrong_hint_leads_to_lost_in_space(tracking: Harness, sky: Sky, pose: Rotation) -> None:
+def test_wrong_hint_falls_back_to_lost_in_space(
+    tracking: Harness, sky: Sky, pose: Rotation
+) -> None:
     hint(tracking, turned(pose, 150))
     assert not process(tracking, sky.picture)["Valid"]
     assert "IDModeError" not in tracking.flags()
@@ -180,7 +188,7 @@ def test_a_new_hint_replaces_the_attitude(tracking: Harness, sky: Sky, pose: Rot
 
 
 @pytest.mark.parametrize("profile", ["extended"])
-def test_a_hint_is_used_up_by_the_first_fix(tracking: Harness, sky: Sky, pose: Rotation) -> None:
+def test_hint_is_discarded_after_the_first_fix(tracking: Harness, sky: Sky, pose: Rotation) -> None:
     hint(tracking, pose)
     process(tracking, sky.picture)
     nearby = turned(pose, 2)  # too far to track
@@ -214,7 +222,9 @@ def test_tracking_needs_two_stars(tracking: Harness, sky: Sky, pose: Rotation) -
     assert error_deg(attitude_of(values), pose) < 0.05
 
 
-def test_too_few_stars_are_no_sign_of_a_rate(tracking: Harness, sky: Sky, pose: Rotation) -> None:
+def test_too_few_stars_do_not_raise_a_rate_flag(
+    tracking: Harness, sky: Sky, pose: Rotation
+) -> None:
     process(tracking, sky.picture)
     process(tracking, take(tracking.catalogue, pose, most=1).picture)
     assert tracking.flags() == {"LessThanThreeStarsDetected"}
@@ -228,7 +238,9 @@ def test_the_mode_flag_is_written_to_flash_when_it_changes(tracking: Harness, sk
     assert mode_flag(tracking) is MatchMode.TRACKING
 
 
-def test_a_mode_flag_needs_an_attitude(tracking: Harness, sky: Sky, pose: Rotation) -> None:
+def test_tracking_mode_without_an_attitude_falls_back_to_lost_in_space(
+    tracking: Harness, sky: Sky, pose: Rotation
+) -> None:
     hint(tracking, pose)
     tracking.power_on()  # the flag is in flash, the hint is gone
     tracking.command("setIDMode", IdMode=IdMode.TRACKING)
@@ -237,7 +249,7 @@ def test_a_mode_flag_needs_an_attitude(tracking: Harness, sky: Sky, pose: Rotati
     assert tracking.flags() == {"IDModeError"}
 
 
-def test_times_are_those_of_the_charged_cycles(lit: Harness) -> None:
+def test_phase_times_equal_the_charged_cycles(lit: Harness) -> None:
     lit.command("CaptureImage")
     start_us = lit.now_us
     lit.command("DetectStars")
@@ -252,7 +264,7 @@ def test_times_are_those_of_the_charged_cycles(lit: Harness) -> None:
     assert lit.telemetry("TimingSummary")["DetectionTime"] == whole["StarDetectionTime"]
 
 
-def test_the_longest_time_is_kept(lit: Harness) -> None:
+def test_longest_detection_time_is_kept(lit: Harness) -> None:
     lit.command("CaptureImage", "DetectStars")
     lit.command("setDetectionRegion", Yend=40)
     lit.command("DetectStars")
@@ -260,7 +272,7 @@ def test_the_longest_time_is_kept(lit: Harness) -> None:
     assert 0 < times["StarDetectionTime"] < times["MaxStarDetectionTime"]
 
 
-def test_each_phase_took_as_long_as_its_cycles(lit: Harness) -> None:
+def test_phase_times_equal_their_charged_cycles(lit: Harness) -> None:
     lit.command("CaptureAndProcess")
     processing = lit.program.commands.processing
     measured = lit.meter.phases.keys() & processing.latest_ms.keys()

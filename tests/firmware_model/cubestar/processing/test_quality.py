@@ -72,12 +72,14 @@ def test_each_failure_has_a_reason(outcome: MatchOutcome) -> None:
 
 
 @pytest.mark.parametrize("profile", ["published"])
-def test_as_published_nothing_is_rated(unit: Harness, sky: Sky) -> None:
+def test_published_profile_reports_no_quality(unit: Harness, sky: Sky) -> None:
     assert unit.telemetry("Quality") == pytest.approx(UNRATED, rel=1e-6)
     assert quality(unit, sky.picture) == pytest.approx(UNRATED, rel=1e-6)
 
 
-def test_failures_say_why(extended: Harness, catalogue: StarCatalogue, pose: Rotation) -> None:
+def test_failed_solutions_report_a_reason(
+    extended: Harness, catalogue: StarCatalogue, pose: Rotation
+) -> None:
     values = quality(extended, np.zeros((512, 1024), np.uint8))
     assert (values["Valid"], values["Reason"]) == (False, Reason.TOO_FEW_STARS)
     assert [values[f"Sigma{axis}"] for axis in "XYZ"] == pytest.approx([np.pi] * 3)
@@ -87,7 +89,9 @@ def test_failures_say_why(extended: Harness, catalogue: StarCatalogue, pose: Rot
     assert quality(extended, mirrored.picture)["Reason"] == Reason.NO_PICTURE
 
 
-def test_errors_are_as_large_as_claimed(extended: Harness, catalogue: StarCatalogue) -> None:
+def test_attitude_errors_match_the_reported_sigma(
+    extended: Harness, catalogue: StarCatalogue
+) -> None:
     ratios = []
     for true in Rotation.random(40, rng=np.random.default_rng(11)):
         values = quality(extended, take(catalogue, true).picture)

@@ -78,7 +78,7 @@ def test_mode_steps_up_after_a_fix_and_back_down(tracking: Harness, pose: Rotati
 
 
 @pytest.mark.parametrize("failures", [0, 1])
-def test_a_base_is_too_old_when_the_body_can_be_outside_of_the_cone(
+def test_reference_attitude_expires_when_the_body_may_have_left_the_cone(
     tracking: Harness, pose: Rotation, failures: int
 ) -> None:
     seen(tracking, pose)
@@ -87,7 +87,7 @@ def test_a_base_is_too_old_when_the_body_can_be_outside_of_the_cone(
     assert seen(tracking, turned(pose, 4.5), wait_s=5.0) == (LOST, Reason.SOLVED)
 
 
-def test_a_hint_is_used_once(tracking: Harness, pose: Rotation) -> None:
+def test_hint_is_used_for_one_image_only(tracking: Harness, pose: Rotation) -> None:
     seen(tracking, pose)
     elsewhere = turned(pose, 90)
     hint(tracking, turned(elsewhere, 3))
@@ -97,7 +97,7 @@ def test_a_hint_is_used_once(tracking: Harness, pose: Rotation) -> None:
     assert seen(tracking, elsewhere) == (LOST, Reason.SOLVED)
 
 
-def test_contradiction_needs_second_fix(
+def test_contradicting_fix_needs_a_second_one(
     tracking: Harness, pose: Rotation, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(transitions, "SURE", 0.0)  # nothing is
@@ -124,18 +124,24 @@ def test_another_contradiction_replaces_the_candidate(unsure: Harness, pose: Rot
     assert unsure.program.state.candidate is None
 
 
-def test_a_sure_fix_needs_no_second_one(tracking: Harness, pose: Rotation) -> None:
+def test_contradicting_fix_with_low_false_alarm_needs_no_confirmation(
+    tracking: Harness, pose: Rotation
+) -> None:
     seen(tracking, pose)
     assert seen(tracking, turned(pose, 60), wait_s=5.0) == (LOST, Reason.SOLVED)
     assert tracking.telemetry("Quality")["LogFalseAlarm"] < np.log10(transitions.SURE)
 
 
-def test_a_base_contradicts_nothing_after_half_a_turn(unsure: Harness, pose: Rotation) -> None:
+def test_old_reference_attitude_cannot_contradict_after_half_a_turn(
+    unsure: Harness, pose: Rotation
+) -> None:
     assert seen(unsure, turned(pose, 170), wait_s=181.0) == (LOST, Reason.SOLVED)
     assert "IDModeError" in unsure.flags()
 
 
-def test_base_keeps_its_age_across_a_reset_on_day_50(tracking: Harness, pose: Rotation) -> None:
+def test_reference_attitude_keeps_its_age_across_a_reset_on_day_50(
+    tracking: Harness, pose: Rotation
+) -> None:
     """In flash a picture's time has 32 bits, in ms."""
     tracking.run(until_us=1000 << 32)
     seen(tracking, pose, wait_s=1.0)
@@ -143,7 +149,9 @@ def test_base_keeps_its_age_across_a_reset_on_day_50(tracking: Harness, pose: Ro
     assert seen(tracking, turned(pose, 0.2)) == (TRACKING, Reason.SOLVED)
 
 
-def test_commanded_lost_in_space_judges_each_picture_alone(unsure: Harness, pose: Rotation) -> None:
+def test_commanded_lost_in_space_solves_each_image_independently(
+    unsure: Harness, pose: Rotation
+) -> None:
     unsure.command("setIDMode", IdMode=IdMode.LOST_IN_SPACE)
     for degrees in (60, -50, 10):
         assert seen(unsure, turned(pose, degrees)) == (LOST, Reason.SOLVED)

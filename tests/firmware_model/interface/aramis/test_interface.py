@@ -27,42 +27,42 @@ USE_CASES = {
 }
 
 
-def test_every_use_case_has_its_telecommands_and_they_are_no_extensions() -> None:
+def test_use_case_telecommands_are_exactly_the_non_extensions() -> None:
     named = [name for names in USE_CASES.values() for name in names]
     assert named == [m.name for m in INTERFACE.telecommands if not m.extension]
     assert {m.id >= 100 for m in INTERFACE.telecommands if m.extension} == {True}
 
 
-def test_the_node_has_its_address_and_rate() -> None:
+def test_aramis_node_has_its_address_and_baud_rate() -> None:
     assert (INTERFACE.i2c_address, INTERFACE.baud) == (0x1D, 57_600)
     assert INTERFACE.ack_errors is AckError
     assert INTERFACE.telemetry("TcmdProcessed").field("Processed").type == "u8"
 
 
-def test_the_attitude_s_answer_has_quaternion_image_time_and_reason() -> None:
+def test_attitude_telemetry_has_quaternion_time_outcome_and_reason() -> None:
     names = {field.name for field in INTERFACE.telemetry("Attitude").fields}
     wanted = {"Q0", "Q1", "Q2", "Q3", "JulianDay", "Millisecond", "Outcome", "Reason", "Valid"}
     assert wanted <= names
 
 
-def test_every_finding_of_the_processing_has_a_reason() -> None:
+def test_every_processing_finding_has_a_telemetry_reason() -> None:
     assert {finding.name for finding in Finding} <= {reason.name for reason in Reason}
     others = {r.name for r in Reason} - {f.name for f in Finding} - {"NOT_MEASURED"}
     assert all(Reason[name] >= 16 for name in others)
 
 
-def test_spike_methods_are_those_of_the_processing() -> None:
+def test_telecommand_spike_methods_match_the_processing() -> None:
     assert {m.name: int(m) for m in SpikeMethod} == {m.name: int(m) for m in SpikeRemoval}
 
 
-def test_each_setting_is_shown_as_it_is_sent() -> None:
+def test_setting_telemetry_has_the_fields_of_its_telecommand() -> None:
     for frame, command in SETTINGS_SHOWN.items():
         assert INTERFACE.telemetry(frame).fields == INTERFACE.telecommand(command).fields
     settings = {m.name for m in INTERFACE.telecommands if m.name.startswith("Set")}
     assert settings - {"SetSystemTime", "SetProfile", "SetSwitch"} <= set(SETTINGS_SHOWN.values())
 
 
-def test_limits_are_those_of_the_things_themselves() -> None:
+def test_telecommand_limits_match_the_hardware_limits() -> None:
     last = INTERFACE.telecommand("ImageBlockSet").field("BlockNumber").high
     assert last == IMAGE_BYTES // 128 - 1 == 1280 * 1024 // 128 - 1
     assert INTERFACE.telecommand("SetExposure").field("Rows").high == 0x3FFF
@@ -78,5 +78,7 @@ def test_limits_are_those_of_the_things_themselves() -> None:
         ("StartLoop", {"Period": 500, "Mode": 1}, "f40101"),
     ],
 )
-def test_examples_on_the_wire(command: str, values: dict[str, object], wire: str) -> None:
+def test_telecommands_encode_to_the_documented_bytes(
+    command: str, values: dict[str, object], wire: str
+) -> None:
     assert INTERFACE.telecommand(command).pack(**values).hex() == wire

@@ -24,7 +24,7 @@ def registers(*declared: CameraRegister) -> CameraRegisterMap:
     return CameraRegisterMap("TEST1", 0x21, 2, declared)
 
 
-def test_lookup_by_name_and_by_any_address_of_the_register() -> None:
+def test_registers_are_found_by_name_and_by_any_of_their_addresses() -> None:
     table = registers(CONTROL, GAIN)
     assert table["GAIN"] is GAIN
     owners = [table.at(address) for address in range(0x0F, 0x14)]
@@ -33,18 +33,18 @@ def test_lookup_by_name_and_by_any_address_of_the_register() -> None:
 
 
 @given(value=st.integers(0, 255))
-def test_fields_take_their_bits_only(value: int) -> None:
+def test_register_fields_extract_only_their_bits(value: int) -> None:
     assert CONTROL.field("ON").of(value) == value & 1
     assert CONTROL.field("DEPTH").of(value) == (value & 0x60) // 0x20
     assert CONTROL.field("DEPTH").mask == 0x60
 
 
-def test_declared_bits() -> None:
+def test_register_bits_combine_the_declared_fields() -> None:
     assert CONTROL.bits == 0x61
     assert GAIN.bits == 0xFFFF
 
 
-def test_unknown_names_are_named_with_the_known_ones() -> None:
+def test_unknown_register_names_are_reported_with_known_ones() -> None:
     with pytest.raises(UnknownRegisterError, match=r"TEST1 has no register 'GAIM', only GAIN"):
         registers(GAIN)["GAIM"]
     with pytest.raises(UnknownRegisterError, match=r"no bit field .OF., only ON, DEPTH"):
@@ -61,7 +61,7 @@ def test_rejects_overlapping_declarations() -> None:
 
 
 @pytest.mark.parametrize("sensor", [mlx75412, mt9m001, ov7620], ids=lambda s: s.REGISTERS.camera)
-def test_tables_are_consistent(sensor: ModuleType) -> None:
+def test_camera_register_tables_are_consistent(sensor: ModuleType) -> None:
     for register in sensor.REGISTERS:
         assert 0 <= register.reset < 1 << (register.unit_bits * register.width)
         if sensor is not ov7620:  # which has bits that are set and not declared
@@ -126,14 +126,14 @@ def test_bits_are_where_they_are_published(row: str) -> None:
         assert CAMERAS[camera].REGISTERS[register].field(field).mask == 1 << int(bit)
 
 
-def test_every_register_is_where_it_is_published() -> None:
+def test_ov7620_registers_have_their_published_addresses() -> None:
     assert {register.name: register.address for register in ov7620.REGISTERS} == OV7620
     assert {register.width for register in ov7620.REGISTERS} == {1}
     assert ov7620.REGISTERS["GAIN"].bits == 0x3F  # of eight
     assert (ov7620.REGISTERS.i2c_address << 1, ov7620.REGISTERS.address_bytes) == (0x42, 1)
 
 
-def test_the_window_after_a_reset_is_the_whole_picture() -> None:
+def test_window_after_reset_is_the_whole_image() -> None:
     edges = [ov7620.REGISTERS[name].reset for name in ("HSTART", "HSTOP", "VSTART", "VSTOP")]
     assert edges == [0x2F, 0xCF, 0x05, 0xF5]
     assert (ov7620.window_column(323), ov7620.window_row(101)) == (0x2F + 80, 0x05 + 50)
@@ -148,7 +148,7 @@ def test_timing_after_reset_is_that_of_ccir_601() -> None:
     assert [ov7620.REGISTERS[name].reset for name in names] == [0, 0, 0]
 
 
-def test_every_published_register_is_declared_where_it_is() -> None:
+def test_published_mlx75412_registers_have_their_addresses_and_widths() -> None:
     assert {r.name: (r.address, r.width) for r in mlx75412.REGISTERS} == MLX75412
     assert mlx75412.REGISTERS.i2c_address == 0b0101100
     assert mlx75412.REGISTERS.at(0x841F) is mlx75412.REGISTERS["LINEARITY"]
@@ -159,7 +159,7 @@ def test_every_published_register_is_declared_where_it_is() -> None:
     assert all(r.unit_bits == 16 and r.width == 1 for r in mt9m001.REGISTERS)
 
 
-def test_published_values() -> None:
+def test_mlx75412_registers_have_the_published_values() -> None:
     assert mlx75412.REGISTERS["CLOCKS_PER_SECOND"].reset == 0x019BFCC0
     assert mlx75412.REGISTERS["FRAMES_PER_SECOND"].reset == 0x001E
     assert mlx75412.LONGEST_EXPOSURE.to_bytes(2, "big") == b"\x00\x02"
@@ -174,7 +174,7 @@ def test_only_mode_select_and_sync_act_at_once() -> None:
     assert {r.name for r in mlx75412.REGISTERS if not r.needs_sync} == {"MODE_SELECT", "SYNC"}
 
 
-def test_published_frame_time() -> None:
+def test_mt9m001_frame_time_matches_the_published_one() -> None:
     line = mt9m001.COLUMNS + mt9m001.FRAME_START_CLOCKS + mt9m001.FRAME_END_CLOCKS
     assert line / mt9m001.PIXEL_CLOCK_HZ == pytest.approx(31.75e-6)
     assert (mt9m001.ROWS + 26) * line / mt9m001.PIXEL_CLOCK_HZ == pytest.approx(33.34e-3, abs=1e-5)
@@ -184,12 +184,14 @@ def test_published_frame_time() -> None:
     ("register", "amplification"),
     [(0x08, 1.0), (0x20, 4.0), (0x51, 4.25), (0x60, 8.0), (0x61, 9.0), (0x67, 15.0)],
 )
-def test_published_gains(register: int, amplification: float) -> None:
+def test_mt9m001_gain_registers_have_the_published_gains(
+    register: int, amplification: float
+) -> None:
     assert mt9m001.gain(register) == amplification
     assert mt9m001.gain(mt9m001.gain_register(amplification)) == amplification
 
 
-def test_the_nearest_gain_is_found_and_others_refused() -> None:
+def test_gain_register_returns_the_nearest_gain_and_rejects_others() -> None:
     assert mt9m001.gain(mt9m001.gain_register(5.1)) == 5.0
     assert mt9m001.gain(mt9m001.gain_register(14.6)) == 15.0
     for wrong in (0.9, 15.1, float("nan")):

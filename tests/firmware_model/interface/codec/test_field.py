@@ -40,7 +40,7 @@ def test_every_raw_count_survives_decoding_and_encoding(kind: str, data: st.Data
 
 
 @given(st.integers(0, 2**32 - 1))
-def test_float_bits_are_those_of_ieee(raw: int) -> None:
+def test_float_fields_decode_ieee_754_bits(raw: int) -> None:
     value = f32("x", "").decode(raw)
     expected = struct.unpack("<f", struct.pack("<I", raw))[0]
     assert value == expected or (math.isnan(value) and math.isnan(expected))
@@ -57,7 +57,7 @@ def test_rounding_is_half_away_from_zero(value: float) -> None:
 @pytest.mark.parametrize(
     ("value", "raw"), [(0.5, 1), (-0.5, -1), (1.5, 2), (-2.5, -3), (0.49999999999999994, 0)]
 )
-def test_rounding_of_halves(value: float, raw: int) -> None:
+def test_field_encoding_rounds_halves_away_from_zero(value: float, raw: int) -> None:
     assert i16("x", "").encode(value, saturate=False) == raw & 0xFFFF
 
 
@@ -71,14 +71,14 @@ def test_telemetry_saturates_and_telecommands_refuse(kind: str) -> None:
             field.encode(value, saturate=False)
 
 
-def test_not_a_number_is_zero_in_telemetry_and_refused_in_telecommands() -> None:
+def test_nan_is_encoded_as_0_in_telemetry_and_refused_in_telecommands() -> None:
     field = i16("x", "")
     assert field.encode(math.nan, saturate=True) == 0
     with pytest.raises(InterfaceError, match="does not fit"):
         field.encode(math.nan, saturate=False)
 
 
-def test_large_floats_become_infinite_in_telemetry_and_are_refused_in_telecommands() -> None:
+def test_large_floats_become_infinite_in_telemetry_only() -> None:
     field = f32("x", "")
     assert field.decode(field.encode(-1e39, saturate=True)) == -math.inf
     assert field.decode(field.encode(math.inf, saturate=False)) == math.inf
@@ -106,13 +106,13 @@ def test_choices_go_by_number_or_name() -> None:
         field.encode("gren", saturate=False)
 
 
-def test_text_is_no_number() -> None:
+def test_field_rejects_text_as_a_number() -> None:
     with pytest.raises(InterfaceError, match="x: '7' is not a number"):
         u8("x", "").encode("7", saturate=True)
 
 
 @given(st.floats(width=32))
-def test_limits_of_floats_are_taken_as_the_wire_carries_them(value: float) -> None:
+def test_float_limits_are_compared_in_single_precision(value: float) -> None:
     field = f32("x", "", low=-math.pi / 2, high=math.pi / 2)
     edge = struct.unpack("<f", struct.pack("<f", math.pi / 2))[0]
     assert field.allows(value, {}) == (math.isfinite(value) and abs(value) <= edge)
@@ -129,7 +129,7 @@ def test_counts_without_a_scale_stay_integers() -> None:
     assert bool1("x", "").decode(1) is True
 
 
-def test_limit_may_depend_on_another_field() -> None:
+def test_field_limit_may_depend_on_another_field() -> None:
     field = u16("x", "", high=100, high_by=("size", {0: 100, 1: 50}))
     assert field.allows(100, {"size": 0})
     assert not field.allows(51, {"size": 1})
@@ -145,7 +145,7 @@ def test_limit_may_depend_on_another_field() -> None:
         ({"scale": 0}, "scale must be positive"),
     ],
 )
-def test_rejects_wrong_declarations(wrong: dict[str, Any], message: str) -> None:
+def test_field_rejects_wrong_declarations(wrong: dict[str, Any], message: str) -> None:
     with pytest.raises(InterfaceError, match=message):
         Field(**{"type": "u8", "name": "x", "meaning": ""} | wrong)
 

@@ -34,7 +34,7 @@ def trailing_escapes(data: bytes) -> int:
         ("", "1F7F 1FFF"),
     ],
 )
-def test_published_examples(payload: str, frame: str) -> None:
+def test_frames_match_the_published_examples(payload: str, frame: str) -> None:
     assert encode_frame(bytes.fromhex(payload)) == bytes.fromhex(frame)
     assert events(FrameDecoder(LIMIT), bytes.fromhex(frame)) == [bytes.fromhex(payload)]
 
@@ -46,7 +46,9 @@ def test_any_payloads_round_trip(payloads: list[bytes]) -> None:
 
 
 @given(NOISE, PAYLOAD)
-def test_noise_before_a_frame_loses_it_only_as_declared(noise: bytes, payload: bytes) -> None:
+def test_noise_before_a_frame_loses_it_only_after_an_open_escape(
+    noise: bytes, payload: bytes
+) -> None:
     found = events(FrameDecoder(LIMIT), noise + encode_frame(payload))
     swallowed = b"\x1f\x7f" in noise and trailing_escapes(noise) % 2 == 1
     if not swallowed:
@@ -54,7 +56,7 @@ def test_noise_before_a_frame_loses_it_only_as_declared(noise: bytes, payload: b
 
 
 @given(NOISE, PAYLOAD, PAYLOAD)
-def test_the_second_frame_after_any_noise_is_found(noise: bytes, one: bytes, two: bytes) -> None:
+def test_second_frame_after_any_noise_is_decoded(noise: bytes, one: bytes, two: bytes) -> None:
     found = events(FrameDecoder(LIMIT), noise + encode_frame(one) + encode_frame(two))
     assert found[-1] == two
 

@@ -35,13 +35,13 @@ WINDOW = Message(20, "Window", "").of(
 )
 
 
-def test_a_node_of_any_kind_is_identified_by_the_same_numbers() -> None:
+def test_identification_telemetry_has_the_same_ids_for_every_node() -> None:
     """As CubeStar's: a host can identify an unknown node."""
     assert [message.id for message in node_telemetry(9, {})] == [128, 130, 131]
     assert CUBESTAR.telemetry("Identification").id == 128
 
 
-def test_fields_stand_one_behind_the_other_and_begin_with_a_byte_unless_they_are_bits() -> None:
+def test_message_fields_are_packed_and_only_bits_share_a_byte() -> None:
     assert [field.bit_offset for field in MIXED.fields] == [0, 8, 15, 16, 32]
     assert MIXED.length == 8
     odd = Message(201, "Odd", "").of(bool1("a", ""), bool1("b", ""), u16("c", ""), bool1("d", ""))
@@ -56,7 +56,7 @@ def test_bytes_are_little_endian_and_bits_count_from_the_lowest() -> None:
 
 
 @given(st.binary(min_size=8, max_size=8))
-def test_every_declared_bit_survives(data: bytes) -> None:
+def test_message_round_trip_keeps_every_declared_bit(data: bytes) -> None:
     packed = MIXED.pack(**MIXED.unpack(data))
     assert packed == bytes((data[0], data[1] & 0x81)) + data[2:]
 
@@ -97,7 +97,9 @@ def test_violations_name_the_flag(values: tuple[int, int], flags: list[str]) -> 
         (lambda: WINDOW.unpack(b"abc"), "Window has 2 bytes, not 3"),
     ],
 )
-def test_errors_name_the_offender_in_one_line(call: Callable[[], object], message: str) -> None:
+def test_message_errors_name_the_field_in_one_line(
+    call: Callable[[], object], message: str
+) -> None:
     with pytest.raises(InterfaceError) as caught:
         call()
     assert str(caught.value).startswith(message)
@@ -128,7 +130,7 @@ def node_of(*telecommands: Message, telemetries: tuple[Message, ...] = ()) -> In
         (lambda: NODE.telemetry(131), "Node has no telemetry frame 131; known: Mixed"),
     ],
 )
-def test_rejects_wrong_declarations(call: Callable[[], object], message: str) -> None:
+def test_message_rejects_wrong_declarations(call: Callable[[], object], message: str) -> None:
     with pytest.raises(InterfaceError, match=message):
         call()
 
@@ -136,21 +138,21 @@ def test_rejects_wrong_declarations(call: Callable[[], object], message: str) ->
 NODE = node_of(WINDOW, telemetries=(MIXED,))
 
 
-def test_messages_and_fields_are_found_by_name_in_any_case_and_messages_by_identifier() -> None:
+def test_messages_and_fields_are_found_by_name_in_any_case() -> None:
     assert WINDOW.field("LOW").name == "low"
     assert NODE.telecommand("window") is NODE.telecommand(20) is NODE.find(20) is WINDOW
     assert NODE.telemetry("MIXED") is NODE.telemetry(200) is NODE.find(200) is MIXED
     assert NODE.find(21) is None
 
 
-def test_an_unsupported_message_is_unknown_to_the_node_only() -> None:
+def test_unsupported_message_is_declared_but_not_found_by_id() -> None:
     later = Message(201, "Later", "", supported=False)
     node = node_of(telemetries=(later,))
     assert node.telemetry("Later") is later
     assert node.find(201) is None
 
 
-def test_choices_are_those_of_messages_and_registers_but_not_the_error_codes() -> None:
+def test_interface_choices_include_registers_but_not_error_codes() -> None:
     class Level(IntEnum):
         LOW = 0
 
@@ -162,7 +164,7 @@ def test_choices_are_those_of_messages_and_registers_but_not_the_error_codes() -
 
 
 @given(st.integers(0, 2**32 - 1))
-def test_a_covariance_comes_back_from_the_wire(seed: int) -> None:
+def test_covariance_round_trips_through_the_message(seed: int) -> None:
     rng = np.random.default_rng(seed)
     root = rng.normal(size=(3, 3)) * 10.0 ** rng.uniform(-6, -2, size=(3, 1))
     covariance = root @ root.T
@@ -173,17 +175,17 @@ def test_a_covariance_comes_back_from_the_wire(seed: int) -> None:
     assert np.all(np.abs(read - covariance) <= 1e-6 * scale)
 
 
-def test_what_is_not_rated_is_unknown() -> None:
+def test_unrated_quality_has_an_unknown_covariance() -> None:
     covariance = attitude_quality.read_covariance(attitude_quality.UNRATED)
     np.testing.assert_allclose(covariance, np.pi**2 * np.eye(3))
 
 
 @pytest.mark.parametrize("wrong", [{"SigmaY": -1e-3}, {"CorrelationYZ": 1.25}, {"SigmaX": np.nan}])
-def test_no_covariance(wrong: dict[str, float]) -> None:
+def test_invalid_covariance_fields_raise_value_error(wrong: dict[str, float]) -> None:
     with pytest.raises(ValueError, match="sigmas must be 0 or more and correlations within 1"):
         attitude_quality.read_covariance(attitude_quality.UNRATED | wrong)
 
 
-def test_chance_that_vanishes_has_a_logarithm() -> None:
+def test_zero_false_alarm_probability_has_a_finite_logarithm() -> None:
     assert attitude_quality.log_false_alarm(0.0) == -30
     assert attitude_quality.log_false_alarm(1e-4) == pytest.approx(-4)

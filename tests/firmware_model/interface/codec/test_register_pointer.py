@@ -37,19 +37,19 @@ def test_measurements_saturate_and_writes_do_not() -> None:
         LEVEL.encode(256, saturate=False)
 
 
-def test_write_limits() -> None:
+def test_register_write_limits_are_checked() -> None:
     assert [LEVEL.allows(value) for value in (0, 9, 10)] == [True, True, False]
     assert not CENTRE.allows(0)
     assert START.allows(255)
     assert [r.readable for r in MAP] == [True, True, False, True]
 
 
-def test_a_stream_carries_bytes() -> None:
+def test_stream_register_decodes_to_raw_bytes() -> None:
     assert STREAM.decode(b"abcde") == b"abcde"
     assert [r.streams for r in MAP] == [False, False, False, True]
 
 
-def test_lookup() -> None:
+def test_registers_are_found_by_name_and_address() -> None:
     assert list(MAP) == [LEVEL, CENTRE, START, STREAM]
     assert MAP["centre"] is MAP.at(0x20) is CENTRE
     assert MAP.at(0x21) is None
@@ -71,7 +71,7 @@ def test_lookup() -> None:
         ),
     ],
 )
-def test_errors_name_the_offender(call: Callable[[], object], message: str) -> None:
+def test_register_map_errors_name_the_register(call: Callable[[], object], message: str) -> None:
     with pytest.raises(InterfaceError) as caught:
         call()
     assert message in str(caught.value)
@@ -81,12 +81,12 @@ TAKE = Letter("a", "TAKE", "", 1, b"Y")
 SEND = Letter("s", "SEND", "", 1000)
 
 
-def test_lookup_by_byte() -> None:
+def test_bench_letters_are_found_by_their_byte() -> None:
     bench = LetterProtocol(115_200, (TAKE, SEND))
     assert (bench.find(ord("a")), bench.find(0), TAKE.request) == (TAKE, None, b"a")
 
 
-def test_rejects_wrong_declarations() -> None:
+def test_letter_protocol_rejects_wrong_declarations() -> None:
     for letter in ("", "ab", "é"):
         with pytest.raises(ValueError, match="is not one ASCII character"):
             Letter(letter, "X", "", 1)

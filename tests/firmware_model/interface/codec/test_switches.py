@@ -19,7 +19,7 @@ class Some(Switches):
     limit: str = switch("how far", "42", "57", "60", source="section 2", reason="more pairs")
 
 
-def test_a_profile_sets_every_switch_and_changes_come_after_it() -> None:
+def test_profile_sets_every_switch_before_single_changes_apply() -> None:
     assert Some.of("published") == Some("1", "42")
     assert Some.of("extended") == Some("6", "57")
     assert Some() == Some.of() == Some.of(DEFAULT_PROFILE)
@@ -29,7 +29,7 @@ def test_a_profile_sets_every_switch_and_changes_come_after_it() -> None:
     assert not Switches.declared()
 
 
-def test_they_know_which_profile_they_are() -> None:
+def test_switches_report_their_profile() -> None:
     names = [Some.of("published").profile, Some.of("extended").profile, Some("1", "57").profile]
     assert names == ["published", "extended", "mixed"]
 
@@ -60,7 +60,7 @@ SET_PROFILE, SET_SWITCH, SHOWN = switch_messages(Own, 100, 200, "kept")
 PUBLISHED, EXTENDED = Own.of("published"), Own.of("extended")
 
 
-def test_a_name_is_one_number_and_a_value_only_its_switchs() -> None:
+def test_switch_message_accepts_only_values_of_that_switch() -> None:
     names = [[choice.name for choice in field.choices or ()] for field in SHOWN.fields]
     assert names[2:] == [["STAR_LIMIT_3_8", "STAR_LIMIT_4", "ALL"], ["ALL", "SOME_OF_THEM"]]
     assert [field.name for field in SHOWN.fields] == ["Profile", "Lens", "StarLimit", "Fit"]
@@ -71,11 +71,11 @@ def test_a_name_is_one_number_and_a_value_only_its_switchs() -> None:
 
 
 @pytest.mark.parametrize("number", [2, 3, 255])
-def test_a_profile_that_is_none_is_refused(number: int) -> None:
+def test_unknown_profile_number_is_refused(number: int) -> None:
     assert SET_PROFILE.violations({"Profile": number})
 
 
-def test_the_boards_switch_is_shown_and_stays() -> None:
+def test_board_switch_is_shown_and_cannot_be_commanded() -> None:
     with pytest.raises(InterfaceError, match="no choice 'LENS'; known: STAR_LIMIT, FIT"):
         SET_SWITCH.pack(**switch_parameters("lens", "drawn"))
     with pytest.raises(InterfaceError, match="no choice 'NONSENSE'; known: STAR_LIMIT_3_8, "):
@@ -94,6 +94,6 @@ def test_frame_shows_the_switches(switches: Own) -> None:
         read_switches(Own, values | {"Fit": 9})
 
 
-def test_one_switch_changes_alone() -> None:
+def test_set_switch_changes_one_switch() -> None:
     values = SET_SWITCH.unpack(SET_SWITCH.pack(**switch_parameters("star_limit", "all")))
     assert apply_command(PUBLISHED, "SetSwitch", values) == Own.of("published", "star_limit=all")

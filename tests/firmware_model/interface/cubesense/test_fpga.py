@@ -30,7 +30,7 @@ ADDRESSING = {
 
 
 @pytest.mark.parametrize("mcu_addressing", [False, True])
-def test_printed_rows_and_standby_in_all_others(mcu_addressing: bool) -> None:
+def test_fpga_levels_outside_the_printed_rows_are_standby(mcu_addressing: bool) -> None:
     listed = PRINTED | OURS | (ADDRESSING if mcu_addressing else {})
     for levels in product("01", repeat=5):
         expected = listed.get("".join(levels), (fpga.Action.STANDBY, fpga.Action.STANDBY))
@@ -38,13 +38,13 @@ def test_printed_rows_and_standby_in_all_others(mcu_addressing: bool) -> None:
         assert found == expected, levels
 
 
-def test_no_levels_are_listed_twice() -> None:
+def test_fpga_commands_have_distinct_pin_levels() -> None:
     for levels in product((0, 1), repeat=5):
         commands = fpga.COMMANDS + fpga.ADDRESSING_COMMANDS
         assert sum(command.fits(*levels) for command in commands) <= 1
 
 
-def test_address_control_sees_the_other_enable_and_moves_shift_only() -> None:
+def test_addressing_commands_show_the_other_enable_and_change_only_shift() -> None:
     for command in fpga.ADDRESSING_COMMANDS:
         assert fpga.link_shows_enables(command.shift or 0, command.edge or 0)
     rows = {(c.edge, c.rnw) for c in fpga.ADDRESSING_COMMANDS}
@@ -65,7 +65,7 @@ def test_rejects_address_outside_the_image(pixel: tuple[int, int]) -> None:
         fpga.address_bytes(*pixel)
 
 
-def test_a_picture_on_the_link_hides_the_enables() -> None:
+def test_enables_are_hidden_exactly_while_the_link_carries_the_image() -> None:
     hidden = [pair for pair in product((0, 1), repeat=2) if not fpga.link_shows_enables(*pair)]
     assert hidden == [(1, 0)]
     crosses = {fpga.Action.SEND_PICTURE, fpga.Action.STORE_OTHER}
@@ -73,7 +73,7 @@ def test_a_picture_on_the_link_hides_the_enables() -> None:
         assert ((command.shift, command.edge) in hidden) == (crosses == set(command.actions))
 
 
-def test_one_fpga_at_most_drives_the_microcontrollers_bus() -> None:
+def test_at_most_one_fpga_drives_the_mcu_bus() -> None:
     drivers = {fpga.Action.READ, fpga.Action.EDGE, fpga.Action.PASS_EDGE, fpga.Action.READ_FROM}
     for command in fpga.COMMANDS + fpga.ADDRESSING_COMMANDS:
         driving = [action for action in command.actions if action in drivers]
@@ -81,7 +81,7 @@ def test_one_fpga_at_most_drives_the_microcontrollers_bus() -> None:
         assert command.shift or command.rnw or not driving, "the microcontroller may drive here"
 
 
-def test_both_ends_of_the_link_fit() -> None:
+def test_link_commands_pair_sending_and_receiving_actions() -> None:
     pairs = {
         fpga.Action.SEND_PICTURE: fpga.Action.STORE_OTHER,
         fpga.Action.SEND_EDGE: fpga.Action.PASS_EDGE,
@@ -91,7 +91,7 @@ def test_both_ends_of_the_link_fit() -> None:
             assert one not in pairs or other is pairs[one]
 
 
-def test_full_size_scan() -> None:
+def test_full_size_scan_visits_the_published_pixels() -> None:
     assert list(fpga.FULL_SIZE.scan_rows) == [15, 79, 143, 207, 271, 335, 399, 463]
     assert list(fpga.FULL_SIZE.scan_columns) == [63, 127, 191, 255, 319, 383, 447, 511, 575, 639]
     pixels = list(fpga.FULL_SIZE.scan())
@@ -115,7 +115,7 @@ def test_full_size_scan() -> None:
         (fpga.SUN_NOT_FOUND, (625, 465)),
     ],
 )
-def test_window_is_inside_of_the_picture(sun: tuple[int, int], origin: tuple[int, int]) -> None:
+def test_sun_window_is_inside_the_image(sun: tuple[int, int], origin: tuple[int, int]) -> None:
     assert fpga.FULL_SIZE.window_origin(*sun) == origin
 
 
@@ -129,12 +129,12 @@ def test_window_is_inside_of_the_picture(sun: tuple[int, int], origin: tuple[int
         ({"rows": 16, "window": 17}, "does not fit into 640 x 16"),
     ],
 )
-def test_rejects_impossible_readouts(change: dict[str, int], error: str) -> None:
+def test_read_out_rejects_impossible_dimensions(change: dict[str, int], error: str) -> None:
     with pytest.raises(ValueError, match=error):
         fpga.ReadOut(**change)
 
 
-def test_as_flown_the_scan_ends_at_an_address_that_there_is() -> None:
+def test_as_flown_scan_ends_at_an_existing_address() -> None:
     """The column behind the last one, modulo what the counter holds."""
     flown = replace(fpga.FULL_SIZE, as_flown=True)
     assert [*flown.scan()][-1] == (703, 0)

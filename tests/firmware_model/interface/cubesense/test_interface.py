@@ -48,7 +48,7 @@ BY_ID = {message.id: message for message in INTERFACE.messages}
 
 
 @pytest.mark.parametrize("number", KNOWN)
-def test_layout_is_the_known_one(number: int) -> None:
+def test_cubesense_messages_have_the_known_layout(number: int) -> None:
     length, types, confidence = KNOWN[number]
     message = BY_ID[number]
     assert (message.length, message.extension) == (int(length), False)
@@ -60,14 +60,14 @@ def test_layout_is_the_known_one(number: int) -> None:
     assert message.confidence.name[0] == confidence
 
 
-def test_nothing_is_missing_and_extensions_keep_to_their_range() -> None:
+def test_known_cubesense_messages_are_declared_and_extensions_in_range() -> None:
     ours = {message.id for message in INTERFACE.messages if message.extension}
     assert BY_ID.keys() - ours == KNOWN.keys()
     assert ours <= set(range(100, 128)) | set(range(220, 256))
     assert all(BY_ID[identifier].confidence is None for identifier in ours)
 
 
-def test_seconds_stand_before_milliseconds() -> None:
+def test_cubesense_identification_has_seconds_before_milliseconds() -> None:
     values = INTERFACE.telemetry("Identification").unpack(bytes.fromhex("0502010300010200"))
     assert (values["RuntimeSeconds"], values["RuntimeMilliseconds"]) == (256, 2)
     assert (INTERFACE.name, INTERFACE.version) == ("CubeSense", 2)
@@ -86,12 +86,14 @@ def test_seconds_stand_before_milliseconds() -> None:
         ("NextImageFrame", {"Frame": 31}, "1F7F 41 1F1F 00 1FFF"),
     ],
 )
-def test_published_telecommand_bytes(name: str, parameters: dict[str, int], frame: str) -> None:
+def test_telecommands_encode_to_the_published_bytes(
+    name: str, parameters: dict[str, int], frame: str
+) -> None:
     message = INTERFACE.telecommand(name)
     assert encode_frame(bytes([message.id]) + message.pack(**parameters)) == bytes.fromhex(frame)
 
 
-def test_published_telemetry_bytes() -> None:
+def test_telemetry_encodes_to_the_published_bytes() -> None:
     result = INTERFACE.telemetry("Result1ThenSram1")
     assert (INTERFACE.telemetry("Identification").id, result.id) == (0x80, 0x96)
     data = bytes.fromhex("D204 C9FD 02 07")
@@ -130,7 +132,7 @@ def test_bad_parameters_are_found(name: str, change: dict[str, int], wrong: list
     assert [field.name for field, _ in message.violations(values)] == wrong
 
 
-def test_published_reset_values() -> None:
+def test_settings_have_the_published_reset_values() -> None:
     def resets(name: str) -> dict[str, object]:
         return dict(INTERFACE.telecommand(name).reset_values())
 
@@ -141,7 +143,7 @@ def test_published_reset_values() -> None:
     assert resets("CameraSettings1")["Exposure"] == 1
 
 
-def test_the_distortion_that_is_set_is_the_measured_one() -> None:
+def test_default_distortion_is_the_measured_one() -> None:
     values = INTERFACE.telecommand("Distortion2").reset_values()
     factors = [
         codes.coefficient(int(values[f"Mantissa{power}"]), int(values[f"Exponent{power}"]))
@@ -153,7 +155,7 @@ def test_the_distortion_that_is_set_is_the_measured_one() -> None:
 
 
 @given(st.floats(-32767, 32767).filter(lambda value: value == 0 or abs(value) > 1e-200))
-def test_coefficients_keep_their_digits(value: float) -> None:
+def test_distortion_coefficients_survive_mantissa_and_exponent(value: float) -> None:
     mantissa, exponent = codes.split_coefficient(value)
     assert -32768 <= mantissa <= 32767
     assert 0 <= exponent <= 255
@@ -167,7 +169,7 @@ def test_rejects_coefficients_out_of_range() -> None:
     assert codes.split_coefficient(1e-300) == (0, 255)
 
 
-def test_named_numbers() -> None:
+def test_enumerations_have_the_published_values() -> None:
     assert [result.value for result in codes.CaptureResult] == [0, 1, 2, 3, 4, 5]
     assert [result.value for result in codes.CaptureResult if result.stored] == [2, 3]
     names = "START_UP NONE_SCHEDULED PENDING TOO_MANY_EDGES TOO_FEW_EDGES BAD_FIT SUN_NOT_FOUND"
@@ -194,7 +196,7 @@ def test_checksum_is_the_exclusive_or() -> None:
     assert codes.checksum(bytes([0x0F, 0xF0, 0x3C])) == 0xC3
 
 
-def test_registers_are_one_byte_two_bytes_or_the_picture() -> None:
+def test_registers_have_1_or_2_bytes_except_the_image_stream() -> None:
     assert REGISTERS is INTERFACE.registers
     assert codes.Measurement in INTERFACE.choices  # only registers use it
     assert REGISTERS.i2c_address == 0x1C

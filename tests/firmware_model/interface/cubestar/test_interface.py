@@ -22,7 +22,7 @@ BY_ID = {message.id: message for message in INTERFACE.messages}
 
 
 @pytest.mark.parametrize("entry", re.split(r"\n(?=\d)", PRINTED.strip()))
-def test_layout_is_the_printed_one(entry: str) -> None:
+def test_cubestar_messages_have_the_printed_layout(entry: str) -> None:
     number, name, length, *fields = entry.split()
     message = BY_ID[int(number)]
     assert (message.name, message.length, message.extension) == (name, int(length), False)
@@ -33,7 +33,7 @@ def test_layout_is_the_printed_one(entry: str) -> None:
         assert field.scale == float(scale or 1)
 
 
-def test_nothing_is_missing_and_extensions_keep_to_their_range() -> None:
+def test_printed_cubestar_messages_are_declared_and_extensions_in_range() -> None:
     printed = {int(entry.split()[0]) for entry in re.split(r"\n(?=\d)", PRINTED.strip())}
     ours = {message.id for message in INTERFACE.messages if message.extension}
     assert printed == set(range(1, 39)) | set(range(128, 178))
@@ -51,7 +51,7 @@ def test_times_are_in_ms_and_currents_in_milliamperes() -> None:
     assert status["Current"] == 71
 
 
-def test_published_reset_values() -> None:
+def test_settings_have_the_published_reset_values() -> None:
     def resets(name: str) -> dict[str, Value]:
         return INTERFACE.telecommand(name).reset_values()
 
@@ -71,7 +71,7 @@ def test_published_reset_values() -> None:
     assert resets("SetDiscardDelay")["Delay"] == 70
 
 
-def test_log_status_shows_the_same_bytes_of_flags() -> None:
+def test_log_status_contains_every_error_flag() -> None:
     flags = INTERFACE.telemetry("ErrorFlags")
     shown = {field.flag for field in INTERFACE.telemetry("LogStatus").fields} - {""}
     assert shown == {field.name for field in flags.fields}
@@ -102,7 +102,9 @@ def test_log_status_shows_the_same_bytes_of_flags() -> None:
         ("setIDMargin", {"Margin": 0.0}, ""),
     ],
 )
-def test_a_bad_parameter_names_its_flag(name: str, values: dict[str, float], flag: str) -> None:
+def test_invalid_parameter_raises_the_flag_of_its_telecommand(
+    name: str, values: dict[str, float], flag: str
+) -> None:
     message = INTERFACE.telecommand(name)
     received = message.unpack(message.pack(**values))
     assert [found for _, found in message.violations(received)] == [flag]
@@ -134,7 +136,7 @@ def test_published_ranges_at_limits(name: str, field: str, low: int, high: int, 
             assert {found for _, found in wrong} == {flag} if refused else not wrong
 
 
-def test_the_thesis_limit_of_invalid_areas_can_be_written_back() -> None:
+def test_max_invalid_stars_accepts_the_published_50() -> None:
     message = INTERFACE.telecommand("setDetectionVariables")
     tried = {n: message.reset_values() | {"MaxInvalidStars": n} for n in range(256)}
     allowed = [n for n, values in tried.items() if not message.violations(values)]
@@ -152,14 +154,14 @@ def test_detection_settings_name_their_flags() -> None:
 
 
 @pytest.mark.parametrize("size", ImageBlockSize)
-def test_the_last_block_of_every_size_ends_with_the_picture(size: ImageBlockSize) -> None:
+def test_last_image_block_of_every_size_ends_with_the_image(size: ImageBlockSize) -> None:
     message = INTERFACE.telecommand("ImageBlockSet")
     last = 1024 * 512 // size.length - 1
     assert not message.violations({"BlockNumber": last, "BlockSize": size})
     assert message.violations({"BlockNumber": last + 1, "BlockSize": size})
 
 
-def test_poles_and_both_conventions_of_right_ascension_are_allowed() -> None:
+def test_tracking_hint_accepts_poles_and_both_ra_conventions() -> None:
     message = INTERFACE.telecommand("setTrackingMode")
     for ra in (-math.pi, 0.0, 2 * math.pi):
         for dec in (-math.pi / 2, math.pi / 2):
@@ -167,7 +169,7 @@ def test_poles_and_both_conventions_of_right_ascension_are_allowed() -> None:
             assert not message.violations(message.unpack(data))
 
 
-def test_stepping_and_unsupported_messages() -> None:
+def test_interface_declares_stepping_and_unsupported_messages() -> None:
     assert {message.name for message in INTERFACE.messages if message.steps} == STEPPING
     unsupported = [message.id for message in INTERFACE.messages if not message.supported]
     assert unsupported == [138]

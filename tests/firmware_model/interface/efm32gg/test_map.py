@@ -38,7 +38,7 @@ TEXT = HEADER.read_text("utf-8")
 LAYOUT_OF = {instance.name: layout for layout in LAYOUTS for instance in layout.instances}
 
 
-def test_peripherals_are_where_the_manual_has_them() -> None:
+def test_peripherals_have_the_documented_addresses() -> None:
     found = {one.name: one.base for layout in LAYOUTS for one in layout.instances}
     assert found == {name: base for name, base in BASES.items() if name in found}
     for instance in (one for layout in LAYOUTS for one in layout.instances):
@@ -47,7 +47,7 @@ def test_peripherals_are_where_the_manual_has_them() -> None:
     assert register_at(0x4000_5000) is None
 
 
-def test_interrupts_have_the_manual_s_numbers() -> None:
+def test_peripheral_interrupts_have_the_documented_numbers() -> None:
     for layout in LAYOUTS:
         for instance in layout.instances:
             for line, number in instance.interrupts.items():
@@ -72,7 +72,9 @@ def structs() -> dict[str, list[tuple[str, int]]]:
 @pytest.mark.parametrize(
     ("kind", "address"), re.findall(r"#define \w+ \(\((\w+) \*\)(0x4\w+)UL\)", TEXT)
 )
-def test_registers_are_where_a_header_of_the_manual_has_them(kind: str, address: str) -> None:
+def test_efm32gg_registers_match_the_addresses_of_the_vendor_header(
+    kind: str, address: str
+) -> None:
     base = int(address, 16)
     compared = 0
     for member, offset in structs()[kind]:
@@ -111,7 +113,7 @@ typedef struct {
 """
 
 
-def test_a_peripheral_has_its_structure_its_masks_its_places_and_its_interrupts() -> None:
+def test_c_header_declares_struct_masks_addresses_and_interrupts() -> None:
     lamp = peripheral(
         "LAMP",
         "Lamp (chapter 9)",

@@ -52,7 +52,7 @@ def aramis(node: FakeAramis) -> Aramis:
     return Aramis(NodeClient(UartLink(node), INTERFACE))
 
 
-def test_quality(node: FakeAramis, aramis: Aramis) -> None:
+def test_quality_returns_reason_false_alarm_and_sigmas(node: FakeAramis, aramis: Aramis) -> None:
     node.values["Quality"] = {
         **{"Valid": 1, "Reason": codes.Reason.CONFIRMED, "LogFalseAlarm": -12.5},
         **{"Matched": 9, "Expected": 11, "Residual": 0.125},
@@ -81,7 +81,7 @@ def test_activate_returns_the_catalogue_state(node: FakeAramis, aramis: Aramis) 
         aramis.activate()
 
 
-def test_attitude(node: FakeAramis, aramis: Aramis) -> None:
+def test_attitude_returns_quaternion_outcome_and_times(node: FakeAramis, aramis: Aramis) -> None:
     node.values["Attitude"] = dict(SOLVED)
     found = aramis.attitude()
     np.testing.assert_allclose(found.quaternion, [0.5, -0.5, 0.5, 0.5])
@@ -129,7 +129,7 @@ def test_julian_dates_are_split_exactly(node: FakeAramis, aramis: Aramis) -> Non
         assert node.log[-1] == ("SetSystemTime", sent)
 
 
-def test_the_latch_up_action_is_off_then_on(node: FakeAramis, aramis: Aramis) -> None:
+def test_latch_up_action_sends_off_then_on(node: FakeAramis, aramis: Aramis) -> None:
     aramis.latch_up_action()
     assert [values["Step"] for name, values in node.log] == [0, 1]
 
@@ -171,7 +171,7 @@ def test_phase_times_in_ms(node: FakeAramis, aramis: Aramis) -> None:
     assert (times["spikes"], times["total"], times["faces"]) == (355.388, 519.668, 0)
 
 
-def test_latest_is_a_log_line(aramis: Aramis, node: Any) -> None:
+def test_latest_returns_a_log_line(aramis: Aramis, node: Any) -> None:
     node.values["Attitude"] = dict(SOLVED)
     line = aramis.latest()
     assert (line["valid"], line["q1"], line["matched"]) == (True, -0.5, 9)

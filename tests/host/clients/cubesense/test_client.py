@@ -68,7 +68,7 @@ def test_direction_is_the_optical_axis_rotated_by_the_field_angle(theta: float, 
 
 @pytest.mark.parametrize("camera", Camera)
 @pytest.mark.parametrize("sram", [None, *Sram])
-def test_capture_and_detect(
+def test_capture_and_detect_returns_the_result(
     cubesense: CubeSense, node: Any, camera: Camera, sram: Sram | None
 ) -> None:
     node.outcomes[camera] = FOUND
@@ -91,7 +91,7 @@ def test_failed_detection_is_returned(cubesense: CubeSense, node: Any, detect: i
     assert found.capture.stored
 
 
-def test_capture_without_detection(cubesense: CubeSense, node: Any) -> None:
+def test_capture_only_returns_the_capture_result(cubesense: CubeSense, node: Any) -> None:
     node.outcomes[Camera.SUN] = {"Capture": 4, "Detect": 1}
     node.capturing = 2
     assert cubesense.capture(Camera.SUN, Sram.SRAM2) is CaptureResult.CAMERA_TIMEOUT
@@ -112,7 +112,7 @@ def test_pending_measurement_times_out(uart: Any, node: Any) -> None:
 
 
 @pytest.mark.parametrize("target", SCHEDULES.values())
-def test_a_result_schedules_the_next_measurement(
+def test_reading_result_then_schedule_starts_the_next_measurement(
     cubesense: CubeSense, node: Any, target: tuple[Camera, Sram]
 ) -> None:
     camera, sram = target
@@ -152,7 +152,7 @@ def test_settings_are_read_back(cubesense: CubeSense, node: Any, camera: Camera)
     assert cubesense.threshold(Camera(1 - camera)) == 0
 
 
-def test_distortion(cubesense: CubeSense, node: Any) -> None:
+def test_set_distortion_sends_mantissas_and_exponents(cubesense: CubeSense, node: Any) -> None:
     factors = [0.1, 0.99, -7.5e-5, 2.5e-6, 0.0]
     cubesense.set_distortion(Camera.NADIR, factors)
     [(name, values)] = node.log
@@ -163,7 +163,7 @@ def test_distortion(cubesense: CubeSense, node: Any) -> None:
         cubesense.set_distortion(Camera.SUN, factors[:4])
 
 
-def test_masks(cubesense: CubeSense, node: Any) -> None:
+def test_set_mask_sends_limits_and_masks_reads_them(cubesense: CubeSense, node: Any) -> None:
     cubesense.set_mask(Camera.SUN, 3, Mask(10, 639, 20, 479))
     cubesense.set_mask(Camera.SUN, 3, None)
     limits = {"XMin": 10, "XMax": 639, "YMin": 20, "YMax": 479}
@@ -178,7 +178,7 @@ def test_masks(cubesense: CubeSense, node: Any) -> None:
             cubesense.set_mask(Camera.SUN, area, None)
 
 
-def test_power(cubesense: CubeSense, node: Any) -> None:
+def test_power_returns_currents_and_over_current_flags(cubesense: CubeSense, node: Any) -> None:
     currents = {"Current3V3": 12.1, "CurrentSram1": 7.3, "CurrentSram2": 9.4, "Current5V": 71.9}
     node.values["Power"] = currents | {"OverCurrent2": 1}
     assert cubesense.power() == Power(12.1, (7.3, 9.4), 71.9, (False, True))
@@ -192,7 +192,7 @@ def test_power(cubesense: CubeSense, node: Any) -> None:
     ]
 
 
-def test_serial_number_and_uptime(cubesense: CubeSense, node: Any) -> None:
+def test_client_decodes_serial_number_and_uptime(cubesense: CubeSense, node: Any) -> None:
     node.values["SerialNumber"] = {"SerialNumber": b"CS01\0\0"}
     assert cubesense.serial_number() == "CS01"
     node.values["SerialNumber"] = {"SerialNumber": b"\xff" * 6}
@@ -202,7 +202,7 @@ def test_serial_number_and_uptime(cubesense: CubeSense, node: Any) -> None:
     assert cubesense.uptime_s() == 7.25
 
 
-def test_phase_times_and_details(cubesense: CubeSense, node: Any) -> None:
+def test_phase_times_and_details_are_read_per_camera(cubesense: CubeSense, node: Any) -> None:
     node.values["PhaseTimes2"] = {"Store": 33_367, "Total": 245_000}
     times = cubesense.phase_times(Camera.NADIR)
     assert list(times) == ["wait", "store", "search", "centroid", "total"]

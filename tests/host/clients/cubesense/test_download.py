@@ -60,7 +60,7 @@ def test_a_frame_is_polled_every_40_ms_for_at_most_2_s(download: Any, node: Any,
     assert uart.silences.count(0.04) == 50
 
 
-def test_a_damaged_frame_is_read_again(download: Any, node: Any) -> None:
+def test_damaged_image_frame_is_read_up_to_3_times(download: Any, node: Any) -> None:
     node.damaged = 2
     square = download()
     np.testing.assert_array_equal(picture_of(square), node.pictures[0, ::16, ::16])
@@ -91,7 +91,7 @@ def test_refused_download_is_not_retried(download: Any, node: Any) -> None:
         download()
 
 
-def test_picture_of_rejects_other_shapes() -> None:
+def test_picture_of_rejects_other_image_shapes() -> None:
     with pytest.raises(ValueError, match=r"side of 1024, 512, 256, 128, 64, not .* \(480, 640\)"):
         picture_of(np.zeros((480, 640), np.uint8))
 
@@ -100,7 +100,7 @@ PICTURE = np.random.default_rng(4).integers(0, 256, (480, 640), np.uint8)
 
 
 @pytest.mark.parametrize(("camera", "letters"), [(Camera.NADIR, "as"), (Camera.SUN, "qw")])
-def test_takes_and_downloads_a_picture(camera: Camera, letters: str) -> None:
+def test_service_port_captures_and_downloads_an_image(camera: Camera, letters: str) -> None:
     take, send = letters
     line = LetterLine(**{take: b"Y", send: PICTURE.tobytes()})
     ServicePortClient(line).take(camera)

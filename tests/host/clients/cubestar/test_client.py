@@ -45,7 +45,7 @@ def test_pointing_matches_the_scenes(seed: int) -> None:
     np.testing.assert_allclose(pointing_deg(rotation.as_quat()), expected, atol=1e-6)
 
 
-def test_latest_is_a_log_line(cubestar: CubeStar, node: Any) -> None:
+def test_latest_returns_a_log_line(cubestar: CubeStar, node: Any) -> None:
     values = {"Q0": 0.0, "Q1": 0.0, "Q2": 0.0, "Q3": 1.0, "ImageTime": 1500, "Matched": 9}
     node.values["AttitudeQuaternion"] = {**values, "Mode": MatchMode.TRACKING, "Valid": 1}
     line = cubestar.latest()
@@ -57,7 +57,9 @@ def test_latest_is_a_log_line(cubestar: CubeStar, node: Any) -> None:
     assert (old["valid"], old["q3"], old["ra_deg"]) == (False, None, None)
 
 
-def test_attitude(cubestar: CubeStar, node: Any) -> None:
+def test_attitude_returns_a_normalised_quaternion_and_its_mode(
+    cubestar: CubeStar, node: Any
+) -> None:
     quaternion = np.array([0.1, -0.2, 0.3, 0.927361849549570])
     node.values["AttitudeQuaternion"] = {
         **{f"Q{index}": value for index, value in enumerate(quaternion)},
@@ -74,7 +76,7 @@ def test_attitude(cubestar: CubeStar, node: Any) -> None:
     np.testing.assert_allclose(cubestar.coarse_quaternion(), [0.6, 0, 0, -0.8], atol=5e-5)
 
 
-def test_quality_is_a_covariance(cubestar: CubeStar, node: Any) -> None:
+def test_quality_returns_the_covariance(cubestar: CubeStar, node: Any) -> None:
     node.values["Quality"] = {
         **{"SigmaX": 1e-4, "SigmaY": 2e-4, "SigmaZ": 5e-4, "Scale": 1.01, "LogFalseAlarm": -9.0},
         **{"CorrelationXY": 0.5, "CorrelationXZ": -0.25, "CorrelationYZ": 0.0},
@@ -92,7 +94,7 @@ def test_quality_is_a_covariance(cubestar: CubeStar, node: Any) -> None:
         cubestar.quality()
 
 
-def test_download(cubestar: CubeStar, node: Any) -> None:
+def test_download_image_reports_progress(cubestar: CubeStar, node: Any) -> None:
     node.memory[:] = np.random.default_rng(5).integers(0, 256, node.memory.size)
     seen: list[tuple[int, int]] = []
     image = cubestar.download_image(lambda done, total: seen.append((done, total)))
@@ -146,7 +148,7 @@ def star(number: int) -> dict[str, Any]:
     return {**place, "StarNumber": number, "Size": 9, "Intensity": 400}
 
 
-def test_stars_are_ordered_wherever_stepping_begins(cubestar: CubeStar, node: Any) -> None:
+def test_stars_are_ordered_wherever_stepping_starts(cubestar: CubeStar, node: Any) -> None:
     node.values["DetectionSummary"] = {"NumStarsDetected": 4}
     node.values["NumIdStars"] = {"numIdStars": 2}
     node.records["StarPositions"] = [star(number) for number in (2, 3, 0, 1)]
@@ -196,7 +198,7 @@ def test_configure_sends_every_setting(cubestar: CubeStar, node: Any) -> None:
         cubestar.configure({"setIDMargin": {"Margin": 0.0}})
 
 
-def test_phase_times(cubestar: CubeStar, node: Any) -> None:
+def test_phase_times_returns_milliseconds_by_phase(cubestar: CubeStar, node: Any) -> None:
     node.values["PhaseTimes"] = {"Idle": 140_000, "Transfer": 404_123, "LoopTotal": 1_000_000}
     known = {"idle": 140.0, "transfer": 404.123, "loop_total": 1000.0}
     names = ["idle", "discard", "capture", "transfer", "detect", "match", "attitude", "loop_total"]

@@ -80,7 +80,7 @@ def test_sets_the_threshold_that_confirms_most_stars() -> None:
     assert len(sky.modes) == len(LADDER)
 
 
-def test_tie_goes_to_the_threshold_with_more_votes() -> None:
+def test_find_threshold_breaks_ties_by_votes() -> None:
     # Of n stars, each has at most n - 1 others that vote for it.
     sky: Any = Sky({6: (9, 5, 4), 25: (9, 5, 9), 32: (9, 6, 3)})
     assert find_threshold(sky) == 25
@@ -88,7 +88,7 @@ def test_tie_goes_to_the_threshold_with_more_votes() -> None:
     assert find_threshold(sky) == 6
 
 
-def test_matches_of_several_views_are_added() -> None:
+def test_find_threshold_adds_matches_of_several_views() -> None:
     skies = [{6: (9, 6, 9)}, {10: (9, 5, 9)}, {10: (9, 4, 9)}]
     sky: Any = Sky({})
 
@@ -101,7 +101,7 @@ def test_matches_of_several_views_are_added() -> None:
     assert sky.captured == 3
 
 
-def test_without_an_attitude_the_threshold_does_not_change() -> None:
+def test_threshold_is_restored_when_no_sky_is_solved() -> None:
     sky: Any = Sky({})
     assert find_threshold(sky) is None
     assert sky.thresholds == (7, 9)
@@ -170,7 +170,7 @@ def test_firmware_corrects_the_distortion_within_the_residual() -> None:
     assert calibration.rms_px < 0.03
 
 
-def test_without_distortion_the_fit_is_exact() -> None:
+def test_calibration_without_distortion_is_exact() -> None:
     calibration = calibrate(Camera(1100.0, 500.0, 250.0))
     assert calibration.max_px < 1e-9
     assert calibration.settings["setFocalLength"]["FocalLength"] == pytest.approx(1100 * 0.0056)
@@ -178,7 +178,7 @@ def test_without_distortion_the_fit_is_exact() -> None:
         assert all(abs(value) < 1e-9 for value in calibration.settings[name].values())
 
 
-def test_no_other_coefficients_are_better() -> None:
+def test_calibration_minimises_the_distortion_error() -> None:
     best = calibrate(PHOTOGRAPHS)
     pixels = np.stack(np.meshgrid(np.linspace(0, 1023, 128), np.linspace(0, 511, 64)), -1)
     pixels = pixels.reshape(-1, 2)
@@ -197,7 +197,7 @@ def test_no_other_coefficients_are_better() -> None:
                 assert cost(Calibration(other, 0.0, 0.0)) > cost(best)
 
 
-def test_projection_of_a_point_worked_by_hand() -> None:
+def test_camera_projection_matches_a_hand_calculation() -> None:
     # x = 0.2, y = 0, so r2 = 0.04.
     camera = Camera(1000.0, 500.0, 250.0, k1=0.5, k2=0.25, p1=0.01, p2=0.02)
     column = 500 + 1000 * (0.2 * (1 + 0.5 * 0.04 + 0.25 * 0.0016) + 0.02 * (0.04 + 0.08))

@@ -49,7 +49,7 @@ def measure(**options: Any) -> list[AramisResult]:
     return list(measure_device("aramis", **options))  # type: ignore[arg-type]
 
 
-def test_random_sky_lost_in_space() -> None:
+def test_random_skies_are_solved_lost_in_space() -> None:
     frames = measure(frames=3, profile="extended")
     for frame in frames:
         assert (frame.right, frame.wrong, frame.flips, frame.status) == (True, 0, 0, "")
@@ -69,7 +69,7 @@ def test_same_seed_repeats_the_result() -> None:
     assert first.truth != other.truth
 
 
-def test_modes_noise_rates_and_published_settings() -> None:
+def test_aramis_measure_supports_modes_noise_rates_and_settings() -> None:
     (aided,) = measure(mode="assisted", hint_error=4)
     assert (aided.right, aided.mode) == (True, "assisted")
     (ideal,), (quiet,) = measure(no_noise=True), measure(without=NOISE_TERMS)
@@ -90,7 +90,7 @@ def test_bit_flips_in_flash_are_counted() -> None:
     assert damaged.reason in ("catalogue_damaged", "no_catalogue")
 
 
-def test_scene_file_and_scene_object(tmp_path: Path) -> None:
+def test_measure_accepts_a_scene_file_or_object(tmp_path: Path) -> None:
     path = tmp_path / "sky.toml"
     path.write_text('kind = "sky"\nra_deg = 84.0\ndec_deg = -1.0\n', encoding="utf-8")
     made = SkyScene.pointing(84.0, -1.0)
@@ -99,7 +99,7 @@ def test_scene_file_and_scene_object(tmp_path: Path) -> None:
     assert all(frame.right for frame in frames)
 
 
-def test_picture_file(tmp_path: Path) -> None:
+def test_image_file_is_solved_without_truth(tmp_path: Path) -> None:
     scene = SkyScene.pointing(84.0, -1.0, 20.0)
     settings = read_settings(RegisterFile(REGISTERS))
     settings = replace(settings, exposure_rows=6299, gains=(15.0,) * 4)  # type: ignore[arg-type]
@@ -135,7 +135,7 @@ def test_rejects_invalid_options(options: dict[str, Any], complaint: str) -> Non
     ("third", "turned_deg", "far"),
     [((25930,), 0, False), ((25930,), 20, False), ((25930,), 24, True), ((), 0, None)],
 )
-def test_far_triangle_is_wrong_as_in_the_thesis(
+def test_triangle_outside_the_field_is_counted_as_wrong(
     third: tuple[int, ...], turned_deg: float, far: bool | None
 ) -> None:
     belt = [Star(0, 0.0, 0.0, 100.0, one) for one in (26311, 26727, *third)]

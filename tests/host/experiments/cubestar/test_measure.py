@@ -45,7 +45,7 @@ def test_truth_is_read_from_the_camera_file(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("images", [[], {}, {"sky.png": 1}, {"other.png": {}}])
-def test_camera_file_without_the_picture_has_no_truth(images: object, tmp_path: Path) -> None:
+def test_camera_file_without_that_image_has_no_truth(images: object, tmp_path: Path) -> None:
     camera = tmp_path / "camera.json"
     camera.write_text(json.dumps({"images": images}), encoding="utf-8")
     assert _picture_truth(Path("sky.png"), camera) is None
@@ -102,7 +102,7 @@ def test_stars_more_than_0_2_deg_away_are_wrong(off_deg: tuple[float, ...], wron
     assert count_wrong(cubestar(*off_deg), TRUTH) == wrong
 
 
-def test_without_truth_wrong_stars_are_unknown() -> None:
+def test_wrong_stars_are_unknown_without_truth() -> None:
     assert count_wrong(cubestar(0.0, 0.0, 9.0), None) is None
     emulated: Any = SimpleNamespace(board=SimpleNamespace(camera=SimpleNamespace(scene=object())))
     assert _count_wrong(emulated, [], None) is None

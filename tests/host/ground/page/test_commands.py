@@ -28,7 +28,7 @@ def test_changed_setting_is_marked(page: Any) -> None:
     assert "single registers" in page.inner_text("#sensor-status")
 
 
-def test_registers_of_the_image_sensor_have_names(page: Any) -> None:
+def test_page_names_image_sensor_registers(page: Any) -> None:
     page.click("#read-sensor")
     page.wait_for_selector("#sensor-status >> text=/ differ from their default$/")
     assert page.locator("#sensor-rows tr").count() == 9
@@ -92,7 +92,7 @@ def test_saved_lines_are_kept_per_device(page: Any) -> None:
     assert page.locator("#saved-lines li").count() == 0
 
 
-def test_recording_is_played(chromium: Any, tmp_path: Path) -> None:
+def test_page_plays_a_recording(chromium: Any, tmp_path: Path) -> None:
     path = recorded_threshold(tmp_path / "run.rec", 60.0)
     with station(str(path)) as address, shown(chromium, address) as page:
         page.wait_for_selector("#playback-time >> text=/ of 6[0-9][.][0-9]+ s$/")

@@ -50,7 +50,7 @@ def test_telemetry_and_commands_use_the_bus(page: Any) -> None:
     assert page.locator("#read-registers").is_disabled()
 
 
-def test_registers_are_read_and_written(page: Any) -> None:
+def test_page_reads_and_writes_registers(page: Any) -> None:
     assert REGISTERS is not None
     named = {one.name: one for one in REGISTERS}
     page.click("#settings summary >> text=/[0-9]+ registers/")

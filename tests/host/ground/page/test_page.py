@@ -13,7 +13,7 @@ from ..browser import LOOKS, check_layout, line, look, saved, shown
 pytestmark = pytest.mark.xdist_group("page")  # so that its emulations are started once
 
 
-def test_attitude_words_and_flags_are_shown(page: Any) -> None:
+def test_attitude_error_sphere_and_task_status_are_shown(page: Any) -> None:
     page.select_option("#command", "CaptureAndProcess")
     page.click("#send")
     told = page.locator("#attitude-status")
@@ -163,7 +163,9 @@ def test_page_works_with_the_keyboard_only(page: Any) -> None:
 
 
 @pytest.mark.parametrize(("scheme", "width"), quick(LOOKS, 2))
-def test_layout_and_contrast(chromium: Any, address: str, scheme: str, width: int) -> None:
+def test_page_has_no_overflow_overlap_or_low_contrast(
+    chromium: Any, address: str, scheme: str, width: int
+) -> None:
     size = {"width": width, "height": 850}
     with shown(chromium, address, viewport=size, color_scheme=scheme) as page:
         for device in ("AraMiS", "CubeSense", "CubeStar"):
@@ -186,7 +188,7 @@ GREEN = (
 """Counts the green pixels drawn over the picture."""
 
 
-def test_captured_picture_is_shown(page: Any) -> None:
+def test_page_shows_the_captured_image(page: Any) -> None:
     page.select_option("#command", "CaptureAndProcess")
     page.click("#send")
     # At power-up a memory holds noise; the picture is a dark sky with stars.
@@ -215,7 +217,7 @@ def test_found_edges_are_drawn(page: Any) -> None:
 
 
 @pytest.mark.slow
-def test_picture_is_zoomed_and_moved(page: Any) -> None:
+def test_page_image_is_zoomed_and_moved(page: Any) -> None:
     picture = page.locator("#zoom-frame")
     wide = "document.querySelector('#canvas').clientWidth"
     shifted = "document.querySelector('#zoom-frame').scrollLeft"
@@ -245,7 +247,7 @@ def test_picture_is_zoomed_and_moved(page: Any) -> None:
 
 
 @pytest.mark.slow
-def test_magnitudes_are_drawn(page: Any) -> None:
+def test_page_draws_magnitudes(page: Any) -> None:
     page.check("#detections")
     line(page, "write CaptureAndProcess")
     page.wait_for_selector("#picture >> text=/detected, .* identified/")
@@ -257,7 +259,7 @@ def test_magnitudes_are_drawn(page: Any) -> None:
 
 
 @pytest.mark.slow
-def test_picture_is_uploaded_and_downloaded(page: Any, tmp_path: Path) -> None:
+def test_image_is_uploaded_and_downloaded(page: Any, tmp_path: Path) -> None:
     picture = np.random.default_rng(1).integers(0, 2, (512, 1024), np.uint8) * 200
     picture[40:] = 0  # black blocks are not sent
     sent = tmp_path / "sent.png"
@@ -285,7 +287,7 @@ def test_picture_is_uploaded_and_downloaded(page: Any, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_picture_rate_is_selectable(page: Any) -> None:
+def test_page_refresh_rate_is_selectable(page: Any) -> None:
     page.evaluate(
         "() => { window.asked = []; const send = WebSocket.prototype.send;"
         "WebSocket.prototype.send = function (text) {"

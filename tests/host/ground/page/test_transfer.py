@@ -33,7 +33,7 @@ def downloaded(page: Any, path: Path, source: str | None = None) -> bytes:
 
 
 @pytest.mark.parametrize("port", ["cubestar"], indirect=True)
-def test_uploaded_picture_is_downloaded_unchanged(chromium: Any, tmp_path: Path, port: str) -> None:
+def test_uploaded_image_is_downloaded_unchanged(chromium: Any, tmp_path: Path, port: str) -> None:
     sent = np.zeros((2, 512, 1024), np.uint8)
     sent[:, 100:130] = np.random.default_rng(4).integers(0, 256, (2, 30, 1024), np.uint8)
     save_picture(sent[0], tmp_path / "sent.png")
@@ -49,7 +49,7 @@ def test_uploaded_picture_is_downloaded_unchanged(chromium: Any, tmp_path: Path,
 
 @pytest.mark.slow
 @pytest.mark.parametrize("port", ["cubesense"], indirect=True)
-def test_captured_picture_is_downloaded_unchanged(chromium: Any, tmp_path: Path, port: str) -> None:
+def test_captured_image_is_downloaded_unchanged(chromium: Any, tmp_path: Path, port: str) -> None:
     with station(port, "--device", "cubesense") as address, shown(chromium, address) as page:
         line(page, "write CaptureAndDetect Camera=NADIR Sram=SRAM2")
         page.wait_for_selector("#lines li.good >> text=CaptureAndDetect: done")

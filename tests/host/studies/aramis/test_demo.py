@@ -87,7 +87,9 @@ def test_demo_measures_lost_in_space_and_near_a_direction(
         assert (tmp_path / name).exists()
 
 
-def test_a_refused_attitude_has_no_error(show: Any, capsys: pytest.CaptureFixture[str]) -> None:
+def test_demo_prints_the_reason_of_a_refused_attitude(
+    show: Any, capsys: pytest.CaptureFixture[str]
+) -> None:
     outcome, reason = MeasurementOutcome.AMBIGUOUS, Reason.SEVERAL
     refused = replace(FOUND, valid=False, outcome=outcome, reason=reason)
     assert show(Tracker(FOUND, refused)) is False
@@ -122,7 +124,7 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
 
 
-def test_facts_and_image(tmp_path: Path, run: Run) -> None:
+def test_catalogue_command_prints_facts_and_writes_the_image(tmp_path: Path, run: Run) -> None:
     output = tmp_path / "image.bin"
     code, out, err = run("catalogue", "aramis", *SMALL, "--json", "--output", output)
     assert (code, err) == (0, "")
@@ -136,7 +138,7 @@ def test_facts_and_image(tmp_path: Path, run: Run) -> None:
     assert len(list((tmp_path / "cache" / "cubestack").iterdir())) == 1
 
 
-def test_text_output(run: Run) -> None:
+def test_catalogue_command_prints_text(run: Run) -> None:
     code, out, err = run("catalogue", "aramis", *SMALL)
     assert (code, err) == (0, "")
     assert "published triangles  265292" in out

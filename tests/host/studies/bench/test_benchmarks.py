@@ -171,7 +171,9 @@ def test_i2c_client_prints_the_median_rate(
     assert float(capsys.readouterr().out) == pytest.approx(1000, rel=0.01)
 
 
-def test_cubestar_figures(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_cubestar_benchmark_reports_all_its_figures(
+    clock: Clock, monkeypatch: pytest.MonkeyPatch
+) -> None:
     one, asked = Device(clock), list[dict[str, Any]]()
     monkeypatch.setattr(cubestar, "power_up", powered(one, asked))
     names = ("rtl_clocks_per_s", "strides_per_s", "strobes_per_s", "instructions_per_s")
@@ -197,7 +199,9 @@ def test_cubestar_figures(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None
     assert asked == [{"engine": "compiled"}, {"engine": "compiled", "firmware": "reference"}]
 
 
-def test_cubesense_figures(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_cubesense_benchmark_reports_all_its_figures(
+    clock: Clock, monkeypatch: pytest.MonkeyPatch
+) -> None:
     from cubestack.emulator.boards.cubesense import benchmark as board
 
     monkeypatch.setattr(cubesense, "power_up", powered(Device(clock), []))
@@ -211,7 +215,7 @@ def test_cubesense_figures(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> Non
     assert set(found) == set(cubesense.BENCHMARK.figures)
 
 
-def test_aramis_figures(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_aramis_benchmark_reports_all_its_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     """It takes pictures in its loop, which needs activation."""
     monkeypatch.setattr(bench, "ROUNDS", 1)
     monkeypatch.setattr(aramis, "LOOP_S", 1)

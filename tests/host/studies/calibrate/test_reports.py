@@ -52,7 +52,7 @@ def calibrated(folder: Path, **more: Any) -> list[cubesense.CalibrateResult]:
     return list(cubesense.EXPERIMENT.run(Opener(device("cubesense")), options))
 
 
-def test_fits_a_lens_to_pictures_of_lights(lights: Path) -> None:
+def test_calibrate_fits_a_lens_to_images_of_lights(lights: Path) -> None:
     (found,) = calibrated(lights, out=lights / "out.json")
     assert (found.sensor, found.places) == ("sun", len(ANGLES))
     assert found.boresight_px == pytest.approx((322.5, 239.0), abs=0.1)
@@ -85,7 +85,7 @@ def test_names_an_invalid_line_of_angles(lights: Path, text: str | None, message
 
 
 @pytest.mark.parametrize(("above", "seen"), [(19, False), (21, True)])
-def test_light_is_at_least_20_grey_values_above_background(
+def test_calibration_light_must_be_20_grey_values_above_background(
     lights: Path, above: int, seen: bool
 ) -> None:
     picture = np.full((480, 640), 30, np.uint8)
@@ -202,7 +202,7 @@ def test_rejects_options_that_exclude_each_other(kind: Any, options: Any, messag
         kind(**options)
 
 
-def test_pictures_of_a_folder_are_sorted_by_name(tmp_path: Path) -> None:
+def test_images_of_a_folder_are_sorted_by_name(tmp_path: Path) -> None:
     assert CalibrateOptions().pictures == []
     with pytest.raises(ValueError, match="has no pictures: "):
         CalibrateOptions(images=tmp_path).pictures  # noqa: B018
@@ -244,7 +244,7 @@ class Unit:
 
 
 @pytest.mark.parametrize("valid", [True, False])
-def test_pictures_are_matched_lost_in_space_and_need_an_attitude(valid: bool) -> None:
+def test_calibration_frames_use_lost_in_space_and_need_an_attitude(valid: bool) -> None:
     unit: Any = Unit(valid)
     assert CUBESTAR.identify(unit) == (["a star"] if valid else [])
     assert unit.modes == [IdMode.LOST_IN_SPACE]

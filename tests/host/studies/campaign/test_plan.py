@@ -32,7 +32,7 @@ def write(path: Path, text: str = TEXT) -> Path:
     return path
 
 
-def test_every_combination_is_a_point(tmp_path: Path) -> None:
+def test_campaign_has_a_point_for_every_combination(tmp_path: Path) -> None:
     plan = CampaignPlan.read(write(tmp_path / "a.toml"))
     assert len(plan.points) == 6
     blocks = list(plan.blocks())
@@ -67,7 +67,7 @@ def test_seed_defaults_to_0() -> None:
 
 @settings(max_examples=30, deadline=None)
 @given(st.integers(1, 200), st.integers(1, 40))
-def test_blocks_hold_all_frames(frames: int, size: int) -> None:
+def test_campaign_blocks_cover_all_frames(frames: int, size: int) -> None:
     blocks = list(CampaignPlan(device="cubestar", frames=frames, block=size).blocks())
     assert sum(block.frames for block in blocks) == frames
     assert max(block.frames for block in blocks) == min(size, frames)

@@ -65,7 +65,7 @@ def test_rates_and_errors_count_the_rows(make: Make) -> None:
 
 
 @pytest.mark.parametrize(("one", "other"), [(0, 0), (0, 1), (3, 9), (9, 3), (40, 41), (0, 30)])
-def test_by_chance_is_a_binomial_test(one: int, other: int) -> None:
+def test_by_chance_equals_a_binomial_test(one: int, other: int) -> None:
     expected = binomtest(one, one + other).pvalue if one + other else 1.0
     assert by_chance(one, other) == pytest.approx(expected)
 
@@ -83,7 +83,7 @@ def test_comparison_finds_the_point_that_changed(make: Make) -> None:
     assert [(each.outcome, each.worse) for each in back] == [("right", False)]
 
 
-def test_more_wrong_attitudes_are_worse(make: Make) -> None:
+def test_campaign_comparison_marks_more_wrong_attitudes_as_worse(make: Make) -> None:
     changes = compared(make("before", {}), make("after", some("wrong", 30)))
     assert [each.outcome for each in changes if each.worse] == ["right", "wrong"]
 
@@ -245,7 +245,7 @@ def test_worst_replays_failures_and_raises_new_ones(folder: Folder, failing: set
         list(worst(folder, len(rows)))
 
 
-def test_worst_case_of_a_real_device_has_its_picture(tmp_path: Path) -> None:
+def test_worst_case_of_an_emulated_device_has_its_image(tmp_path: Path) -> None:
     plan = CampaignPlan(device="cubestar", frames=2, options={"mag_limit": 3.8})
     folder = Folder.begun(tmp_path / "c", plan, resume=False)
     first, second = (row.result["error_cross_deg"] for row in run(folder, 1))

@@ -47,7 +47,7 @@ def test_two_workers_write_the_same_file(alone: Folder, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_cluster_writes_the_same_file(alone: Folder, tmp_path: Path) -> None:
+def test_cluster_writes_the_same_results_as_one_process(alone: Folder, tmp_path: Path) -> None:
     folder = Folder.begun(tmp_path / "cluster", alone.plan, resume=False)
     with dask_cluster() as cluster:
         list(run(folder, 1, cluster.scheduler_address))
@@ -178,7 +178,7 @@ def test_frame_of_two_cameras_has_two_rows() -> None:
 
 
 @pytest.mark.parametrize("profile", ["published", "extended"])
-def test_block_of_a_real_device(profile: str) -> None:
+def test_campaign_block_runs_on_an_emulated_device(profile: str) -> None:
     plan = CampaignPlan(device="cubestar", frames=2, seed=3, options={"profile": profile})
     rows = perform(*plan.blocks())
     assert [row.outcome for row in rows] == ["right", "right"]

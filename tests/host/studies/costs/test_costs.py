@@ -30,14 +30,14 @@ def test_page_table_is_up_to_date() -> None:
     assert costs().page(recorded()).strip() == told
 
 
-def test_columns_contain_all_phases_but_attitude() -> None:
+def test_cost_table_columns_contain_all_phases_but_attitude() -> None:
     for one in recorded():
         shown = {phase for group in COLUMNS.values() for phase in group}
         assert one.phases.keys() - shown == {"attitude"}  # the published sum has none
         assert shown < one.phases.keys()
 
 
-def test_cases_are_all_builds_and_two_with_other_memories() -> None:
+def test_cost_cases_match_the_recorded_builds_and_timings() -> None:
     levels, kinds = costs().levels, costs().precisions
     cases = [(str(case.build), str(case.timing)) for case in _cases(levels, kinds)]
     assert cases == [(one.build, one.timing) for one in recorded()]
@@ -163,7 +163,7 @@ def test_missing_compiler_names_the_package(run: Run, monkeypatch: pytest.Monkey
 
 
 @pytest.mark.skipif(shutil.which(COMPILER) is None, reason=f"no {COMPILER}")
-def test_measures_a_build(run: Run) -> None:
+def test_costs_command_measures_a_build(run: Run) -> None:
     outcome = run("costs", "measure", "--level", "Os", "--precision", "own", "--json")
     (build,) = json.loads(outcome.out)["builds"]
     assert build["build"] == "-Os own"

@@ -74,7 +74,7 @@ def test_scatter_is_pooled_over_calm_visible_fields(asked: list[Any]) -> None:
     assert found["most"] == pytest.approx(np.mean([12 + field for field in GOOD]))
 
 
-def test_fields_are_at_the_zenith_during_a_sidereal_day(asked: list[Any]) -> None:
+def test_night_fields_are_at_the_zenith_over_a_sidereal_day(asked: list[Any]) -> None:
     night(opener(asked), 10)
     scenes = [one for one in asked if hasattr(one, "quaternion")]
     asked_for = [one for one in asked if isinstance(one, SimpleNamespace)]
@@ -120,7 +120,7 @@ def test_no_usable_field_gives_no_figures(
 
 
 @pytest.mark.skipif(find_compiler() is None, reason="needs the compiled FPGA")
-def test_night_end_to_end() -> None:
+def test_simulated_night_meets_its_limits() -> None:
     found = perform(Job("cubestar", "night", "extended", 1, 1.0))
     assert (found["valid"], found["fields"]) == (100, 1)
     assert 8 <= found["fewest"] <= found["most"] <= 16
@@ -141,7 +141,7 @@ TELEMETRY = {"DetectionSummary": {"NumStarsDetected": 9}, "NumIdStars": {"numIdS
         (True, False, TaskStatus.IDENTIFICATION_FAILED, (0, 0)),
     ],
 )
-def test_identities_are_judged_only_where_stars_are_identified(
+def test_study_judges_identities_only_if_stars_are_identified(
     monkeypatch: pytest.MonkeyPatch,
     judged: bool,
     valid: bool,
@@ -192,7 +192,7 @@ def test_age_grows_until_the_next_attitude(monkeypatch: pytest.MonkeyPatch) -> N
     assert (result.power_mw, result.energy_mj) == (pytest.approx(330), pytest.approx(165))
 
 
-def test_one_attitude_has_no_rate(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_single_attitude_yields_no_rate_or_age(monkeypatch: pytest.MonkeyPatch) -> None:
     result = measured(monkeypatch, [Found(10**12, 5.0, 300.0, right=None)])
     assert (result.attitudes, result.right, result.rate_hz) == (0, None, None)
     assert result.age_ms is result.oldest_ms is result.power_mw is result.energy_mj is None

@@ -64,7 +64,7 @@ def errors_told(text: str) -> list[float]:
     return [float(size) for sizes in told for size in sizes if size]
 
 
-def test_cubestar_solves_a_sky_and_a_picture(
+def test_cubestar_demo_solves_a_sky_and_a_photograph(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     found = cubestar.show(device("cubestar"), tmp_path, 1, tmp_path, ["--profile=extended"])
@@ -128,7 +128,7 @@ def _attitude(kind: Any) -> Any:
     return kind(**{field.name: 5 for field in fields(kind)} | {"valid": True})
 
 
-def test_cubesense_finds_sun_and_nadir(
+def test_cubesense_demo_prints_sun_and_nadir_errors(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     line = SimpleNamespace(close=lambda: None)

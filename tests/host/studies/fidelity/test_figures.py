@@ -31,7 +31,7 @@ CHEAP = [
 
 @pytest.mark.skipif(find_compiler() is None, reason="the whole stack needs the compiled FPGA")
 @pytest.mark.parametrize(("device", "name"), CHEAP)
-def test_figure_matches_the_page(device: str, name: str) -> None:
+def test_measured_figures_match_the_fidelity_page(device: str, name: str) -> None:
     trial = fidelity_of(device).trials[name]
     found = [
         perform(Job(device, name, profile, trial.frames, 1.0))
@@ -66,9 +66,7 @@ def test_field_rates_count_right_and_wrong_attitudes(monkeypatch: pytest.MonkeyP
     }
 
 
-def test_tracked_share_leaves_out_the_first_picture_of_a_sky(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_tracked_share_excludes_the_first_frame_of_a_sky(monkeypatch: pytest.MonkeyPatch) -> None:
     one = [shot(10, 8), *[shot(10, 10, tracked=True, cross_deg=0.03)] * 6, *[shot(10, 7)] * 3]
     two = [shot(0, 0, valid=False, right=False, cross_deg=np.nan)] * 2
     two += [shot(6, 6, right=False, cross_deg=0.5)]
@@ -90,7 +88,7 @@ def attitude(cross: float, roll: float = 0.0, **more: Any) -> SimpleNamespace:
     return SimpleNamespace(error_cross_deg=cross, error_roll_deg=roll, **usual | more)
 
 
-def test_cubestar_errors_count_right_attitudes_and_times_full_pictures() -> None:
+def test_cubestar_fidelity_uses_right_attitudes_and_times_of_full_images() -> None:
     times = {"detect": 100.0, "match": 20.0, "attitude": 5.0}
     results = [attitude(0.001 * n, -0.002 * n) for n in range(101)]
     results += [attitude(3.0, 2.0, right=False), attitude(9.0, right=False, solved=False)]
@@ -112,7 +110,7 @@ SHARES = {"right", "off", "wrong", "far", "conclusive", "ambiguous", "none"}
 
 
 @pytest.mark.parametrize("module", [cubestar, aramis])
-def test_without_right_attitudes_there_are_no_errors(module: Any) -> None:
+def test_fidelity_errors_are_nan_without_right_attitudes(module: Any) -> None:
     more = {"far": None, "outcome": "none"} if module is aramis else {}
     found = module._attitudes([attitude(3.0, right=False, solved=module is cubestar, **more)])
     assert (found["right"], found["off" if module is cubestar else "none"]) == (0, 100)
@@ -135,7 +133,7 @@ def test_aramis_errors_are_in_arcsec_and_outcomes_are_counted() -> None:
     assert found["roll95"] == pytest.approx(np.quantile(range(0, 20, 2), 0.95))
 
 
-def test_cubesense_figures_per_axis_and_per_band() -> None:
+def test_cubesense_fidelity_figures_are_computed_per_axis_and_band() -> None:
     rng = np.random.default_rng(5)
     truth, off = rng.uniform(-70, 70, (60, 2)), rng.normal(0.1, 0.3, (60, 2))
     phases = {"wait": 10.0, "store": 20.0, "total": 50.0}
@@ -174,7 +172,7 @@ def test_cubesense_figures_per_axis_and_per_band() -> None:
     assert found["sigma_ms"] == pytest.approx(np.std(range(60)))
 
 
-def test_sun_errors_at_90_degrees() -> None:
+def test_fidelity_reports_the_worst_sun_error_at_90_degrees() -> None:
     one = {"alpha_deg": 90.05, "beta_deg": 0.0, "error_deg": 0.05, "edges": None, "detected": True}
     truth = {"truth_alpha_deg": 90.0, "truth_beta_deg": 0.0}
     times = {"phase_ms": {"wait": 1.0, "store": 1.0, "total": 2.0}}
@@ -192,7 +190,9 @@ def test_sun_errors_at_90_degrees() -> None:
     assert np.isnan(found["worst_rest"])
 
 
-def test_still_sun_is_measured_at_the_angles_of_the_row(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_sun_repeatability_is_measured_at_the_angles_of_its_row(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     seen: list[float] = []
 
     def found_at(_device: str, *, frames: int, scene: Any, **_: Any) -> list[SimpleNamespace]:

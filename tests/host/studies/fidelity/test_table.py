@@ -35,7 +35,7 @@ def test_rows_have_unique_keys() -> None:
 
 
 @pytest.mark.parametrize("name", BUILT_IN)
-def test_trials_and_rows_belong_together(name: str) -> None:
+def test_every_fidelity_row_has_a_trial_and_every_trial_a_row(name: str) -> None:
     rows = list(fidelity_of(name).rows)
     assert {row.trial for row in rows} == set(fidelity_of(name).trials)
     assert all(all((row.figure, row.source, row.published, row.ours)) for row in rows)

@@ -33,7 +33,7 @@ def test_only_cubesense_has_hazards_of_the_earth() -> None:
     assert not of_earth & {*hazards_of(device("cubestar")), *hazards_of(device("aramis"))}
 
 
-def test_each_camera_has_a_picture_per_frame() -> None:
+def test_hazard_curve_counts_one_image_per_camera_and_frame() -> None:
     (point,) = run_jobs([Job("cubesense", "extended", "terminator", 0.0, 2, 4)], 1)
     assert (point.pictures, point.right) == (4, 4)
 
@@ -82,7 +82,7 @@ def test_page_numbers_match_the_points() -> None:
         assert row in page
 
 
-def test_out_writes_pictures_curves_and_points(tmp_path: Path, run: Run) -> None:
+def test_out_writes_images_curves_and_points(tmp_path: Path, run: Run) -> None:
     arguments = ("--hazard", "gradient", "--frames", "1", "--workers", "1", "--out", tmp_path)
     lines = run("hazards", "cubestar", *arguments, "--json").out.splitlines()
     printed = [json.loads(line) for line in lines]

@@ -39,7 +39,9 @@ def counters() -> list[UpsetResult]:
 
 
 @pytest.mark.slow
-def test_every_bit_is_hit_in_every_phase(counters: list[UpsetResult]) -> None:
+def test_upset_experiment_hits_every_counter_bit_in_every_phase(
+    counters: list[UpsetResult],
+) -> None:
     hit = [(r.target, r.bit, r.phase) for r in counters if not r.memory]
     registers = [f"{part}.counter.row" for part in ("writer", "reader")]
     phases = ("idle", "storing", "between", "reading")
@@ -138,7 +140,7 @@ def test_each_layout_has_its_registers(layout: str) -> None:
 
 
 @pytest.mark.parametrize("gateware", quick(["as-flown", "corrected"], 1))
-def test_upsets_of_two_linked_fpgas(gateware: str) -> None:
+def test_upset_experiment_covers_two_linked_fpgas(gateware: str) -> None:
     results = measured(
         *("cubesense", cubesense.EXPERIMENT),
         **{"gateware": gateware, "registers": "*_writer.ack", "memory_bits": 0},
@@ -162,7 +164,7 @@ def test_rejects_unknown_registers_and_memories(options: dict[str, str], message
 
 
 @pytest.mark.slow
-def test_upsets_of_firmware_memories() -> None:
+def test_upset_experiment_covers_firmware_memories() -> None:
     results = measured(
         *("cubestar", cubestar.EXPERIMENT, {"firmware": "reference"}),
         **{"memories": "ram,flash", "memory_bits": 2, "registers": "bank"},

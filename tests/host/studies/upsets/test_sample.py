@@ -67,7 +67,7 @@ def changed(*places: int) -> Snapshot:
         (replace(CLEAN, violations={"read-access": 1, "wire-contention": 1}), "contention"),
     ],
 )
-def test_effect_is_the_most_severe(found: Snapshot, effect: Effect) -> None:
+def test_upset_effect_is_the_most_severe_one(found: Snapshot, effect: Effect) -> None:
     assert effect_of(found, CLEAN, ROW) == effect
 
 
@@ -75,7 +75,7 @@ def test_effect_is_the_most_severe(found: Snapshot, effect: Effect) -> None:
     ("answer", "right", "solved"),
     [("right", True, True), ("wrong", False, True), ("refused", False, False)],
 )
-def test_wrong_answer_is_solved_and_refusal_is_not(
+def test_wrong_answer_counts_as_solved_and_refusal_does_not(
     answer: Answer, right: bool, solved: bool
 ) -> None:
     one = replace(RIGHT, answer=answer)
@@ -132,7 +132,7 @@ class Device:
         (["refused", "wrong", "wrong", "wrong"], None),
     ],
 )
-def test_loops_run_until_an_answer_is_right(
+def test_upset_recovery_counts_iterations_until_a_right_answer(
     answers: Sequence[Answer], recovered: int | None
 ) -> None:
     device = Device(answers)
@@ -180,7 +180,7 @@ class Port:
         return 2
 
 
-def test_acknowledges_are_recorded_when_they_change() -> None:
+def test_port_watch_records_acknowledge_changes_only() -> None:
     port: Any = Port()
     watch = PortWatch(port, ("ACK", "DONE"))
     for now_ps, name, level in (
@@ -207,7 +207,7 @@ def test_received_bytes_are_kept() -> None:
     assert bytes(watch.data) == bytes([1, 2, 3, 4, 5])
 
 
-def test_other_calls_are_passed_on() -> None:
+def test_port_watch_passes_other_calls_on() -> None:
     port: Any = Port()
     watch = PortWatch(port, ("ACK",))
     watch.set_pin("READ", 1)
@@ -236,7 +236,9 @@ def test_large_results_are_returned() -> None:
 @pytest.mark.parametrize(
     ("act", "message"), [(lambda: 1 // 0, "ZeroDivisionError: "), (lambda: os._exit(3), "died")]
 )
-def test_error_and_death_of_the_copy_are_raised(act: Callable[[], int], message: str) -> None:
+def test_error_or_death_of_a_forked_copy_raises_copy_error(
+    act: Callable[[], int], message: str
+) -> None:
     with pytest.raises(CopyError, match=message):
         in_copy(act)
 
@@ -266,7 +268,7 @@ def test_rate_weights_phases_by_duration() -> None:
     assert idle.a_day == pytest.approx(2.0 * 9 * 0.75)
 
 
-def test_left_over_state_is_seen_only_with_a_bad_answer() -> None:
+def test_left_over_state_counts_as_seen_only_with_a_bad_answer() -> None:
     left = replace(RIGHT, effect="left over")
     assert atlas([left])[0].seen == 0
     assert atlas([replace(left, answer="refused")])[0].seen == 1

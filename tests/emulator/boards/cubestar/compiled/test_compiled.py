@@ -111,7 +111,7 @@ def test_fault_does_not_consume_stack_of_later_calls() -> None:
     assert calls.machine.register("sp") == before
 
 
-def test_sources_are_rewritten_in_the_careless_form() -> None:
+def test_sources_are_rewritten_for_each_float_precision() -> None:
     line = "float y = 0.5f * sqrtf(x) + 0x1.8p+1f; // pair_2.0f"
     assert rewrite_source(line, "own") == line
     assert rewrite_source("float y = 0.5f * sqrtf(x);", "literals") == "float y = 0.5 * sqrt(x);"
@@ -125,7 +125,7 @@ def test_sources_are_rewritten_in_the_careless_form() -> None:
 @needs_compiler
 @pytest.mark.usefixtures("recorded_compiler")
 @pytest.mark.parametrize("seed", [1, 2])
-def test_the_python_program_charges_what_the_compiled_one_takes(fast: Calls, seed: int) -> None:
+def test_python_charges_match_the_compiled_program_per_phase(fast: Calls, seed: int) -> None:
     """All in all within 8 %, the longer phases within 15 %, those below 1.5 ms within 40 %.
 
     Short phases run once through code that the flash's cache does not have yet.

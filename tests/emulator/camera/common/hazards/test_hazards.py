@@ -68,7 +68,7 @@ def test_least_strength_has_no_effect(name: str, camera: str) -> None:
 
 @pytest.mark.parametrize("camera", CAMERAS)
 @pytest.mark.parametrize("counts", [10.0, 60.0])
-def test_a_gradient_ends_at_its_counts(camera: str, counts: float) -> None:
+def test_gradient_spans_0_to_its_counts_in_every_camera(camera: str, counts: float) -> None:
     one = picture(camera, Gradient(counts=counts, seed=2), scene=DARK, noise=False).astype(int)
     added = one - picture(camera, scene=DARK, noise=False)
     assert added.min() <= 1
@@ -79,7 +79,7 @@ def test_a_gradient_ends_at_its_counts(camera: str, counts: float) -> None:
 
 
 @pytest.mark.parametrize("camera", CAMERAS)
-def test_a_background_has_its_level_and_its_noise(camera: str) -> None:
+def test_background_adds_its_mean_and_noise_in_every_camera(camera: str) -> None:
     counts = picture(camera, Background(counts=20.0, sigma=4.0), scene=DARK, hot_pixels=0)
     added = counts.astype(float) - picture(camera, scene=DARK, hot_pixels=0, noise=False)
     assert added.mean() == pytest.approx(20, abs=1)
@@ -87,7 +87,7 @@ def test_a_background_has_its_level_and_its_noise(camera: str) -> None:
 
 
 @pytest.mark.parametrize("camera", CAMERAS)
-def test_hot_pixels_are_those_of_the_key_and_stay(camera: str) -> None:
+def test_hot_pixel_hazard_equals_the_key_and_is_stable_over_time(camera: str) -> None:
     as_key = picture(camera, scene=DARK, hot_pixels=520)
     as_hazard = picture(camera, HotPixels(count=500), scene=DARK, hot_pixels=20)
     np.testing.assert_array_equal(as_key, as_hazard)
@@ -114,7 +114,9 @@ def test_protons_differ_per_frame_and_damage_stays(camera: str) -> None:
     assert len(damage & later) > 0.8 * len(damage) > 100
 
 
-def test_a_photograph_has_what_happens_in_the_sensor(striped: PictureScene) -> None:
+def test_sensor_hazards_apply_to_an_image_scene_and_lens_hazards_do_not(
+    striped: PictureScene,
+) -> None:
     own = picture("cubestar", scene=striped)
     np.testing.assert_array_equal(own, striped.pixels)
     veiled = picture("cubestar", Background(counts=20.0, sigma=0.0), scene=striped)
@@ -136,7 +138,7 @@ def test_hazard_adds_little_render_time(name: str) -> None:
     assert seconds(hazard) - seconds() < 0.1  # measured: below 10 ms
 
 
-def test_the_mean_dark_rise_is_the_dark_rows_too() -> None:
+def test_dark_correction_removes_the_mean_dark_current_of_dose() -> None:
     # 10 krad: four times 1008 counts of 12 bits per second, at 65 C in 0.3856 s.
     like = replace(cubestar.CONDITION, hazards=(Dose(krad=10.0),), temperature_c=65.0)
     imager = Mlx75412Imager(1)
@@ -147,7 +149,7 @@ def test_the_mean_dark_rise_is_the_dark_rows_too() -> None:
     assert np.median(corrected) < 5
 
 
-def test_the_mean_dark_rise_leaves_its_noise() -> None:
+def test_mean_dark_current_of_dose_leaves_its_noise() -> None:
     # Away from the sources: four times the dark current is twice its noise.
     def sigma(krad: float) -> float:
         frame = picture("aramis", Dose(krad=krad), Background(sigma=0.0), temperature_c=100.0)
@@ -164,7 +166,7 @@ def gain(hazard: Response) -> np.ndarray:
     return hazard.response(SHAPE)
 
 
-def test_response_differs_as_declared() -> None:
+def test_pixel_response_has_the_declared_spread() -> None:
     field = gain(Response(percent=2.0, columns_percent=0.5, dust=0))
     assert field.mean() == pytest.approx(1, abs=1e-3)
     columns = field.mean(axis=0)
@@ -172,7 +174,7 @@ def test_response_differs_as_declared() -> None:
     assert (field - columns).std() == pytest.approx(0.02, rel=0.02)
 
 
-def test_dust_casts_shadows_of_its_depth() -> None:
+def test_dust_shadows_have_the_declared_depth() -> None:
     # Nothing but shadows, the mean over what a grain covers.
     clean, dusty = (gain(Response(percent=4.0, dust=n, seed=3)) for n in (0, 40))
     shade = dusty / clean

@@ -40,13 +40,15 @@ def test_focal_length_follows_the_temperature() -> None:
     assert warm.focal_length_mm == pytest.approx(6.28 * 1.002)
 
 
-def test_focal_lengths_are_placed_on_both_sides() -> None:
+def test_sampled_focal_length_errors_have_both_signs() -> None:
     placed = {FocalLength.sample(1, None, np.random.default_rng(s)).percent for s in range(20)}
     assert placed == {-1, 1}
 
 
 @pytest.mark.parametrize(("condition", "f", "pitch"), [(CONDITION, 1.256, 5.6), (ARAMIS, 1.2, 5.2)])
-def test_temperature_defocus_is_cone_width(condition: SkyCondition, f: float, pitch: float) -> None:
+def test_temperature_defocus_follows_the_width_of_the_light_cone(
+    condition: SkyCondition, f: float, pitch: float
+) -> None:
     # 40 um before the focus; the standard deviation of an even disc, along one axis: radius / 2.
     blurred = lens(Defocus(um_per_k=1.0), condition=condition, celsius=60)
     disc = 40 / f / 2 / 2 / pitch
@@ -54,12 +56,12 @@ def test_temperature_defocus_is_cone_width(condition: SkyCondition, f: float, pi
     assert blurred.psf_sigma_px == pytest.approx(np.hypot(own, disc), rel=0.01)
 
 
-def test_defocus_by_width_is_the_whole_spot() -> None:
+def test_defocus_width_replaces_the_spot_width() -> None:
     assert lens(Defocus(sigma_px=3.0), celsius=60).psf_sigma_px == 3
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_residuals_have_their_rms_and_are_no_turn_or_scale(seed: int) -> None:
+def test_lens_residuals_have_their_rms_without_rotation_or_scale(seed: int) -> None:
     crooked = lens(LensResiduals(rms_px=0.5, seed=seed))
     y, x = np.mgrid[0:512:8, 0:1024:8]
     pixels = np.stack([x.ravel(), y.ravel()], 1) + 3.5

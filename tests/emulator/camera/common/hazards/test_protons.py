@@ -30,7 +30,7 @@ def test_mean_loss_is_the_published_stopping_power(mev: float, pstar: float) -> 
     assert protons.mean_loss_kev(mev * ONE, ONE)[0] == pytest.approx(pstar * 0.2329, rel=0.03)
 
 
-def test_least_ionising_protons_free_some_fifty_electrons_a_um_in_thin_layers() -> None:
+def test_minimum_ionising_proton_loss_matches_measurements() -> None:
     # Measured: most probable 0.19 to 0.23 keV/um in 5.6 to 10 um; some 80 pairs in 300 um.
     many = np.ones(40_000)
     thin = protons.lost_kev(2500 * many, 8 * many, drawn(1)) / 8
@@ -40,7 +40,7 @@ def test_least_ionising_protons_free_some_fifty_electrons_a_um_in_thin_layers() 
     assert thick * 1000 / protons.PAIR_EV == pytest.approx(80, rel=0.1)
 
 
-def test_the_most_probable_loss_is_below_the_mean_by_landaus_curve() -> None:
+def test_most_probable_proton_loss_follows_landau() -> None:
     # Its peak is at -0.223: loss - mean = xi (-0.223 + 0.423 + beta^2 + ln(xi / largest)), keV.
     gamma = 1 + 1000 / 938.27
     beta2 = 1 - gamma**-2
@@ -51,7 +51,7 @@ def test_the_most_probable_loss_is_below_the_mean_by_landaus_curve() -> None:
     assert np.median(lost) - 0.787 * xi == pytest.approx(peak, abs=0.1)
 
 
-def test_slow_protons_free_thousands() -> None:
+def test_slow_protons_lose_the_tabulated_energy() -> None:
     many = np.ones(20_000)
     electrons = protons.lost_kev(20 * many, 8 * many, drawn(3)) * 1000 / protons.PAIR_EV
     # 20 MeV: 19.7 MeV cm2/g, of which fast delta rays take a little; 3.65 eV a pair.
@@ -71,7 +71,7 @@ def test_number_of_hits_follows_rate_area_and_exposure() -> None:
 
 
 @pytest.mark.slow
-def test_tracks_are_as_long_as_isotropic_incidence_says() -> None:
+def test_proton_track_lengths_follow_isotropic_incidence() -> None:
     # Squared cosines of the angle of incidence are even: half of the tracks go more than as far
     # across as the layer is deep, a tenth three times that.
     lengths = []
@@ -97,7 +97,7 @@ def test_track_charge_equals_the_energy_loss() -> None:
     assert 0.9 * near < total < 1.2 * near
 
 
-def test_a_track_has_its_charge_evenly_about_its_middle() -> None:
+def test_proton_track_charge_is_centred_on_its_middle() -> None:
     starts, along = np.array([[60.0, 20.0]]), np.array([[900.0, 450.0]])
     image = protons._tracks(starts, along, 1e6 * ONE, CUBESTAR, drawn(5))
     middle = [np.average(axis, weights=image) for axis in np.indices(image.shape)[::-1]]
@@ -130,7 +130,7 @@ def test_dose_sets_the_count_and_temperature_the_strength() -> None:
     assert Dose(krad=0.0).dark_rise() == 1
 
 
-def test_places_are_the_sensor_s_in_every_frame() -> None:
+def test_dose_hot_pixels_are_the_same_in_every_frame() -> None:
     first = charge(Dose(krad=1.0, seed=4), seed=1)
     np.testing.assert_array_equal(first, charge(Dose(krad=1.0, seed=4), seed=2))
     assert np.any(first != charge(Dose(krad=1.0, seed=5), seed=1))
@@ -139,7 +139,7 @@ def test_places_are_the_sensor_s_in_every_frame() -> None:
 @pytest.mark.parametrize(
     ("temperature_c", "factor"), [(20, 1), (28, 2), (36, 4), (12, 0.5), (24, 2**0.5)]
 )
-def test_eight_degrees_double_it(temperature_c: float, factor: float) -> None:
+def test_dark_current_doubles_every_8_degrees(temperature_c: float, factor: float) -> None:
     assert dark_at(3.0, temperature_c, 20.0) == pytest.approx(3.0 * factor)
 
 
