@@ -28,7 +28,7 @@ from cubestack.host.ground.session import TargetSession
 from cubestack.host.recording.setups import emulated_setup
 from cubestack.host.targets import open_target
 
-from .browser import STARTED_MS, look, shown, station
+from .browser import look, shown, station
 
 TOKEN = "the token of the tests"
 BEARER = {"Authorization": f"Bearer {TOKEN}"}
@@ -144,10 +144,8 @@ def address(request: pytest.FixtureRequest, chromium: Any) -> Iterator[str]:
     """Address of a page with the ``DEVICES`` of a test module, by default with all sensors."""
     names = getattr(request.module, "DEVICES", device_names())
     with station(*(f"emulated:{name}" for name in names), "--seed", "5") as opened:
-        page = chromium.new_context().new_page()
-        page.goto(opened)
-        page.wait_for_selector("#line", timeout=STARTED_MS)
-        page.context.close()
+        with shown(chromium, opened):  # waits until all devices have started
+            pass
         yield opened
 
 

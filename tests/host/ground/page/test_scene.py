@@ -8,7 +8,7 @@ import pytest
 from cubestack.firmware_model.reference.image import reference_image
 from tests.tiers import quick
 
-from ..browser import HOSTILE, LOOKS, STARTED_MS, check_layout, hostile, look, shown
+from ..browser import HOSTILE, LOOKS, check_layout, hostile, look, shown
 
 pytestmark = pytest.mark.xdist_group("other pages")
 
@@ -241,7 +241,7 @@ def test_scene_keys_are_escaped(chromium: Any, address: str) -> None:
 
 
 def runs(page: Any, text: str) -> None:
-    page.wait_for_selector(f"#start-status >> text={text}", timeout=STARTED_MS)
+    page.wait_for_selector(f"#start-status >> text={text}")
 
 
 @pytest.mark.slow
@@ -254,7 +254,7 @@ def test_profile_and_firmware_are_selected(chromium: Any, address: str, tmp_path
         page.select_option("#option-profile", "extended")
         page.press("#restart", "Enter")
         done = "#lines li.good >> text=/restart.*profile: extended/s"
-        page.wait_for_selector(done, timeout=STARTED_MS)
+        page.wait_for_selector(done)
         for tab in (page, other):
             runs(tab, "running: seed 5, profile extended")
             tab.wait_for_selector("#scene-status >> text=/camera 120.0°/")
