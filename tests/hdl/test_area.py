@@ -27,7 +27,7 @@ DESIGNS = {name: design for table, _ in SENSORS for name, design in table.items(
 ROWS = [(name, design, file) for table, file in SENSORS for name, design in table.items()]
 every_design = pytest.mark.parametrize(("name", "design", "file"), ROWS)
 
-DOCS = Path(__file__).parents[2] / "docs" / "sensors"
+DOCS = Path(__file__).parents[2] / "docs"
 
 
 class Function(Component):
@@ -198,13 +198,13 @@ NEXT_VERSION = {
 @pytest.mark.parametrize(
     ("document", "row", "names"),
     [
-        ("cubesense", r"^\| `(.+)` \|()", DOCUMENTED),
-        ("cubestar-next", r"^\| `(\w+)` \|.*\| (\d+) \|", NEXT_VERSION),
+        ("sensors/gateware-cubesense", r"^\| `(.+)` \|()", DOCUMENTED),
+        ("gateware-cubestar-next", r"^\| `(\w+)` \|.*\| (\d+) \|", NEXT_VERSION),
     ],
     ids=["cubesense", "cubestar-next"],
 )
 def test_documented_area_counts_match_the_designs(document, row, names):
-    text = (DOCS / f"gateware-{document}.md").read_text(encoding="utf-8")
+    text = (DOCS / f"{document}.md").read_text(encoding="utf-8")
     rows = re.findall(row + r" (\d+) \| (\d+) \| (\d+) \|$", text, re.MULTILINE)
     assert {name for name, *_ in rows} == set(names)
     for name, pins, *numbers in rows:
