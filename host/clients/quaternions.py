@@ -61,7 +61,7 @@ class AttitudeQuality:
     """Inputs of an attitude filter, or why there are none."""
 
     valid: bool  #: the latest image gave an attitude, which this rates
-    reason: IntEnum  #: why there is none, or that there is one
+    reason: IntEnum  #: why the attitude is missing, or that it was measured
     #: float64 (3, 3), rad^2, of the rotation from true to reported camera axes, about the camera's
     #: x, y and z
     covariance: NDArray[np.float64]

@@ -175,7 +175,7 @@ def test_pixel_response_has_the_declared_spread() -> None:
 
 
 def test_dust_shadows_have_the_declared_depth() -> None:
-    # Nothing but shadows, the mean over what a grain covers.
+    # Grains only shade pixels; the drop is the mean over a grain's area.
     clean, dusty = (gain(Response(percent=4.0, dust=n, seed=3)) for n in (0, 40))
     shade = dusty / clean
     assert shade.max() == pytest.approx(1)
