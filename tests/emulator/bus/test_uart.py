@@ -1,4 +1,4 @@
-"""The serial line: every byte at its time, a silence reported once; line formats against a stepper."""
+"""The serial line: bytes at their times, a silence reported once; formats against a stepper."""
 
 from fractions import Fraction
 
