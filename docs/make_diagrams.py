@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from cubestack.emulator.recording.scope import Scope
 from cubestack.emulator.rtl.pixel_clock import LoadedSegment
-from cubestack.host.cli.waveform import read
+from cubestack.host.cli.hdl.waveform import read
 from cubestack.host.emulation.emulated import open_device
 from cubestack.host.emulation.records import start_trace
 from docs.diagrams.architecture import architecture
