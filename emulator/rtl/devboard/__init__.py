@@ -1,0 +1,1 @@
+"""The FPGA on a development board, in place of the compiled model."""
