@@ -55,7 +55,7 @@ def encode_deviation(position: int, predicted: int, found: int) -> bytes:
 
 
 def is_full(records: int, size: int) -> bool:
-    """Whether an operation with so many bytes of records ends, for a design of ``size`` bytes."""
+    """Whether an operation ends when its records have this size, with ``size`` output bytes."""
     return records + 2 * (3 + 2 * size) > LONGEST_RECORDS
 
 
