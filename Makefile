@@ -77,7 +77,8 @@ mutants: .venv/ready-dev
 
 test-hdl: .venv/ready-dev
 	@HDL_TIER=full HDL_SEED=$(SEED) HDL_SIMULATOR=$(SIMULATOR) HDL_COVERAGE=out/hdl/coverage \
-		$(BIN)/pytest tests/hdl examples/*/tests -m cocotb -n auto --junitxml=out/hdl/junit.xml -o junit_logging=system-out
+		$(BIN)/pytest tests/hdl examples/*/tests -m cocotb -n auto --junitxml=out/hdl/junit.xml -o junit_logging=system-out \
+		-o console_output_style=classic
 
 lint: .venv/ready-dev
 	@$(BIN)/ruff check .

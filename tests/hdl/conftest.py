@@ -16,13 +16,15 @@ from cocotb_tools.runner import Runner
 from cubestack.hdl.flow.generate import verilog_text
 from tests.hdl import regression
 from tests.hdl.coverage import points
-from tests.hdl.regression import BASE_SEED, HERE, PAIR, SIMULATOR, Outcome
+from tests.hdl.progress import Progress
+from tests.hdl.regression import BASE_SEED, FULL, HERE, PAIR, SIMULATOR, Outcome
 
 # Registers start at X instead of the value that Verilog's initialisers give them: the real part
 # has no such thing. Yosys' own helper signals keep theirs.
 INITIALISER = re.compile(r"^(\s*reg (?:\[\d+:0\] )?[^$;=]*?) = \d+'h\w+;$", re.MULTILINE)
 
 
+@pytest.hookimpl(trylast=True)
 def pytest_configure(config: pytest.Config) -> None:
     folder = os.environ.get("HDL_COVERAGE")
     if folder and not hasattr(config, "workerinput"):
@@ -30,6 +32,9 @@ def pytest_configure(config: pytest.Config) -> None:
         shutil.rmtree(path, ignore_errors=True)
         path.mkdir(parents=True)
         os.environ["HDL_COVERAGE"] = str(path)
+    if FULL and not hasattr(config, "workerinput"):
+        reporter = config.pluginmanager.get_plugin("terminalreporter")
+        config.pluginmanager.register(Progress(reporter._tw, reporter.isatty), "hdl-progress")
 
 
 def pytest_report_header() -> str:

@@ -131,16 +131,23 @@ def _bugs() -> Iterator[Bug]:
 BUGS = tuple(_bugs())
 
 
+def source_of(bug: Bug) -> str:
+    """The text of the bug's module; ValueError unless it has ``bug.old`` exactly once."""
+    file = str(import_module(f"cubestack.hdl.{bug.module}").__file__)
+    text = Path(file).read_text(encoding="utf-8")
+    if (times := text.count(bug.old)) != 1:
+        raise ValueError(f"{bug.module} has {bug.old!r} {times} times, not once")
+    return text
+
+
 @contextmanager
 def planted(bug: Bug) -> Iterator[dict[str, object]]:
     """Everything that the designs and the tiers know of the bug's module has the bug.
 
-    Gives the names that the module defines. ValueError when it does not have the text once.
+    Yields the names that the module defines.
     """
     module = import_module(f"cubestack.hdl.{bug.module}")
-    text = Path(str(module.__file__)).read_text(encoding="utf-8")
-    if (times := text.count(bug.old)) != 1:
-        raise ValueError(f"{bug.module} has {bug.old!r} {times} times, not once")
+    text = source_of(bug)
     copy = ModuleType(module.__name__)
     copy.__file__ = module.__file__
     exec(compile(text.replace(bug.old, bug.new), str(module.__file__), "exec"), vars(copy))
@@ -187,6 +194,11 @@ def test_planted_bug_is_caught(bug: Bug, top: str, tmp_path: Path) -> None:
     (tmp_path / "dut.v").write_text(wrong_verilog(bug, top), encoding="utf-8")
     outcome = run_tier(top, tmp_path / "dut.v", tmp_path / "tier")
     assert outcome.failed, outcome.problem or "not caught"
+
+
+@pytest.mark.parametrize("bug", BUGS, ids=lambda bug: f"{bug.title}, {bug.module}")
+def test_planted_text_occurs_once_in_its_module(bug: Bug) -> None:
+    source_of(bug)
 
 
 def test_every_kind_is_planted_in_both_sensors() -> None:
