@@ -14,6 +14,7 @@ from cubestack.firmware_model.interface.cubesense.fpga import Action
 from cubestack.firmware_model.interface.cubesense.pins import PREFIXES
 from cubestack.hdl.cubesense.dataflow import SIDES, Side
 from cubestack.hdl.proofs.cubesense.designs import DesignMaker, proof_design
+from cubestack.hdl.proofs.model import past
 from cubestack.hdl.proofs.properties import (
     ACKNOWLEDGES,
     acknowledges,
@@ -24,7 +25,7 @@ from cubestack.hdl.proofs.properties import (
     starts_in,
     writer_wires,
 )
-from cubestack.hdl.proofs.prover import Proof, StuckWire, past
+from cubestack.hdl.proofs.prover import Proof, StuckWire
 
 _TARGET = (
     "addressing",

@@ -9,10 +9,13 @@ from amaranth.hdl import Assert, Assume
 from amaranth.hdl._ast import Initial  # not among the public names, though documented as one
 
 from cubestack.firmware_model.interface.pins import Pin
-from cubestack.hdl.proofs.prover import past
+from cubestack.hdl.proofs.model import past
 
 #: What :func:`acknowledges` asserts.
 ACKNOWLEDGES = "ACK is high exactly from when all rows of a frame are stored"
+
+#: The sentence of an assertion that the induction needs.
+AUXILIARY = "a statement about internal registers, which the induction needs"
 
 #: Wires of a writer and their paths below it.
 WRITER_WIRES = {
@@ -62,9 +65,11 @@ def idle_is_reset(m: Module, d: SimpleNamespace, standby: Value, retained: set[s
     for register in d.registers:
         if register.reset is None:
             rests = register.value == past(m, register.value)
-            m.d.comb += Assert(~standby | ~was_standby | Initial() | rests)
+            text = f"in standby register {register.name} does not change"
+            m.d.comb += Assert(~standby | ~was_standby | Initial() | rests, text)
         else:
-            m.d.comb += Assert(~standby | (register.value == register.reset))
+            text = f"in standby register {register.name} has its reset value"
+            m.d.comb += Assert(~standby | (register.value == register.reset), text)
 
 
 def outputs_rest(
@@ -73,25 +78,28 @@ def outputs_rest(
     """In standby each output of ``pins`` has its reset level; the ports in ``but`` need not."""
     for port in (port for pin in pins for port in pin.ports):
         if port.output and port.name not in but:
-            m.d.comb += Assert(~standby | (getattr(d, port.name) == port.level))
+            text = f"in standby {port.name} is {port.level}"
+            m.d.comb += Assert(~standby | (getattr(d, port.name) == port.level), text)
 
 
 def one_sram_driver(m: Module, d: SimpleNamespace, sram: str = "SRAM") -> None:
     """The SRAM drives its data bus while its output enable is low; then the FPGA does not."""
-    m.d.comb += Assert(~getattr(d, f"{sram}_D_OE") | getattr(d, f"{sram}_OE_N"))
+    text = f"FPGA and SRAM never both drive {sram}_D"
+    m.d.comb += Assert(~getattr(d, f"{sram}_D_OE") | getattr(d, f"{sram}_OE_N"), text)
 
 
 def written_is_driven(m: Module, d: SimpleNamespace, sram: str = "SRAM") -> None:
     """While an SRAM is written it is selected, and only the FPGA drives its data bus."""
     one_sram_driver(m, d, sram)
     d_oe, ce_n, we_n = (getattr(d, f"{sram}_{name}") for name in ("D_OE", "CE_N", "WE_N"))
-    m.d.comb += Assert(we_n | (d_oe & ~ce_n))
+    text = f"while {sram}_WE_N is low the SRAM is selected and the FPGA drives {sram}_D"
+    m.d.comb += Assert(we_n | (d_oe & ~ce_n), text)
 
 
 def acknowledges(m: Module, d: SimpleNamespace, ack: Value, **clocks: Value) -> None:
     """ACK is high exactly while one of the writers has stored all rows; ``clocks`` by writer."""
     complete = [acknowledges_all_rows(m, d, writer, clock) for writer, clock in clocks.items()]
-    m.d.comb += Assert(Cat(*complete).any() == ack)
+    m.d.comb += Assert(Cat(*complete).any() == ack, ACKNOWLEDGES)
 
 
 def acknowledges_all_rows(m: Module, d: SimpleNamespace, writer: str, clock: Value) -> Signal:
@@ -118,13 +126,12 @@ def acknowledges_all_rows(m: Module, d: SimpleNamespace, writer: str, clock: Val
     in_order = row == begun - (column != 0)
     over = wires.frame_full | wires.ack
     m.d.comb += [
-        Assert(wires.ack == complete),
-        Assert(~store | in_order),
-        Assert(~last_pixel | (begun == rows)),
-        # Needed for the induction.
-        Assert((column < columns) & (row < rows) & (begun <= rows)),
-        Assert(over | in_order),
-        Assert(~over | ~store),
-        Assert(~wires.line_open | store | wires.line_full | (column != 0)),
+        Assert(wires.ack == complete, ACKNOWLEDGES),
+        Assert(~store | in_order, "a row is stored right after the one above it"),
+        Assert(~last_pixel | (begun == rows), "all rows are stored before the last pixel is"),
+        Assert((column < columns) & (row < rows) & (begun <= rows), AUXILIARY),
+        Assert(over | in_order, AUXILIARY),
+        Assert(~over | ~store, AUXILIARY),
+        Assert(~wires.line_open | store | wires.line_full | (column != 0), AUXILIARY),
     ]
     return complete

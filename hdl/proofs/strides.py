@@ -7,8 +7,9 @@ from amaranth.hdl import Assert, Cat, Module, Mux, Value
 from amaranth.lib.wiring import In
 
 from cubestack.hdl.blocks.pinned import PinnedComponent, Stride
+from cubestack.hdl.proofs.model import past
 from cubestack.hdl.proofs.properties import first_step
-from cubestack.hdl.proofs.prover import Proof, StuckWire, past
+from cubestack.hdl.proofs.prover import Proof, StuckWire
 
 Make = Callable[[bool], tuple[PinnedComponent, SimpleNamespace]]
 
@@ -49,17 +50,21 @@ def _each_clock(m: Module, d: SimpleNamespace) -> None:
     for name, value in registers.items():
         before = past(m, value)
         after = Mux(rises, moved.get(name, before), before)
-        m.d.comb += Assert(~within | (value == after))
+        m.d.comb += Assert(
+            ~within | (value == after), f"register {name} is as a clock of the stride leaves it"
+        )
 
     _at_the_memory(m, d, stride, ready, counter, data)
     address = getattr(d, f"{stride.memory}_A")
-    m.d.comb += Assert(~within | (address[len(counter) :] == past(m, address)[len(counter) :]))
+    stays_there = address[len(counter) :] == past(m, address)[len(counter) :]
+    m.d.comb += Assert(~within | stays_there, f"the high bits of {stride.memory}_A do not change")
     shown = {f"{stride.memory}_{pin}" for pin in ("A", "D_O", "WE_N")}
     if not stride.stores:
         shown.add("DATA")
-        m.d.comb += Assert(~ready | (data == d.DATA))
+        m.d.comb += Assert(~ready | (data == d.DATA), "DATA is the byte read last")
     for name in sorted({*d.size.members} - inputs - shown):
-        m.d.comb += Assert(~within | (getattr(d, name) == past(m, getattr(d, name))))
+        same = getattr(d, name) == past(m, getattr(d, name))
+        m.d.comb += Assert(~within | same, f"{name} does not change")
 
 
 def _at_the_memory(
@@ -74,4 +79,5 @@ def _at_the_memory(
         expected += [d_o == data, d_oe, oe_n, we_n == getattr(d, stride.clock)]
     else:
         expected += [~d_oe, ~oe_n, we_n]
-    m.d.comb += Assert(~ready | Cat(*expected).all())
+    text = f"the pins of {stride.memory} are as the stride says"
+    m.d.comb += Assert(~ready | Cat(*expected).all(), text)

@@ -86,8 +86,8 @@ def describe(path: Path, node: str, seed: int, failed: Outcome, again: Outcome) 
     """
     if not path.exists():
         return "no waveform was written"
-    about = {"test": node, "cocotb": failed.failed[0], "seed": seed + BASE_SEED}
-    about |= {"simulator": SIMULATOR, "error": failed.error}
+    title = f"{failed.failed[0]} of {node}, seed {seed + BASE_SEED}, on {SIMULATOR}"
+    about = {"test": node, "title": title, "error": failed.error}
     path.with_suffix(".json").write_text(json.dumps(about, indent=1), encoding="utf-8")
     alone = "" if again.failed else ", in which it passed alone"
     return f"waveform{alone}: {path}; look at it with: cubestack hdl wave {path.stem}"

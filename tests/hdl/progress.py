@@ -1,4 +1,4 @@
-"""Progress of the whole regression: which tests run, how many are done, and seconds since the start.
+"""Progress of the whole regression: which tests run, how many are done, and how long it runs.
 
 On a terminal one line that is rewritten, else a line when a test starts.
 """

@@ -14,13 +14,13 @@ from amaranth.lib.wiring import Component, In, Out
 from cubestack.hdl.blocks.counters import MatrixCounter
 from cubestack.hdl.flow.tools import have_yosys
 from cubestack.hdl.proofs import cubesense, cubestar
+from cubestack.hdl.proofs.model import UnknownWireError
 from cubestack.hdl.proofs.properties import idle_is_reset
 from cubestack.hdl.proofs.prover import (
     Proof,
     ProofResult,
     ProofVerdict,
     StuckWire,
-    UnknownWireError,
     prove,
     verdict_text,
 )

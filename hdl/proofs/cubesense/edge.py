@@ -8,7 +8,7 @@ from amaranth.hdl import Array, Assert, Cat, Module, Mux, Signal, Value
 from cubestack.firmware_model.interface.cubesense.fpga import SUN_RUN, SUN_THRESHOLD
 from cubestack.hdl.cubesense.dataflow import Side
 from cubestack.hdl.proofs.cubesense.designs import column_row, fpga
-from cubestack.hdl.proofs.properties import domain, starts_in, wires_below, writer_wires
+from cubestack.hdl.proofs.properties import AUXILIARY, domain, starts_in, wires_below, writer_wires
 from cubestack.hdl.proofs.prover import Proof, StuckWire
 
 # Nadir scan: it visits exactly the declared addresses in order.
@@ -44,12 +44,11 @@ def _scans(m: Module, d: SimpleNamespace) -> None:
     column, row = column_row(d)
     at_pixel = (column == x) & (row == y)
     m.d.comb += [
-        Assert(~d.scan | Mux(preset, d.SRAM_A == 0, at_pixel)),
-        # Needed for the induction.
-        Assert((pixel < length) & (line < lines)),
-        Assert((d.on_a_line == ~preset) & (d.vertical == columns)),
-        Assert((d.along == pixel) & (d.line == line)),
-        Assert(~preset | ((pixel == 0) & (line == 0))),
+        Assert(~d.scan | Mux(preset, d.SRAM_A == 0, at_pixel), "SRAM_A is the scan's next pixel"),
+        Assert((pixel < length) & (line < lines), AUXILIARY),
+        Assert((d.on_a_line == ~preset) & (d.vertical == columns), AUXILIARY),
+        Assert((d.along == pixel) & (d.line == line), AUXILIARY),
+        Assert(~preset | ((pixel == 0) & (line == 0)), AUXILIARY),
     ]
 
 
@@ -84,18 +83,19 @@ def _windows(m: Module, d: SimpleNamespace) -> None:
 
     left = origin(d.x, size.window_left, size.columns)
     top = origin(d.y, size.window_above, size.rows)
+    fits = (left + size.window <= size.columns) & (top + size.window <= size.rows)
     column, row = column_row(d)
+    at_pixel = (column == left + i) & (row == top + j)
     m.d.comb += [
-        Assert((left + size.window <= size.columns) & (top + size.window <= size.rows)),
-        Assert(~d.window | inside | (d.SRAM_A == 0)),
-        Assert(~d.window | ~inside | ((column == left + i) & (row == top + j))),
-        # Needed for the induction.
-        Assert(clocks <= 4),
-        Assert((i < size.window) & (j < size.window)),
-        Assert((d.in_window == inside) & (inside | (d.state == clocks))),
-        Assert(inside | ((i == 0) & (j == 0))),
-        Assert(d.right.as_signed() == i - size.window_left),
-        Assert(d.down.as_signed() == j - size.window_above),
+        Assert(fits, "the window is inside of the picture"),
+        Assert(~d.window | inside | (d.SRAM_A == 0), "SRAM_A is 0 before the window"),
+        Assert(~d.window | ~inside | at_pixel, "SRAM_A is the window's next pixel"),
+        Assert(clocks <= 4, AUXILIARY),
+        Assert((i < size.window) & (j < size.window), AUXILIARY),
+        Assert((d.in_window == inside) & (inside | (d.state == clocks)), AUXILIARY),
+        Assert(inside | ((i == 0) & (j == 0)), AUXILIARY),
+        Assert(d.right.as_signed() == i - size.window_left, AUXILIARY),
+        Assert(d.down.as_signed() == j - size.window_above, AUXILIARY),
     ]
 
 
@@ -139,22 +139,23 @@ def _first_sun_pixel(side: Side, m: Module, d: SimpleNamespace) -> None:
     none_reported = Signal()  # not at the first clock after reset, which keeps the coordinates
     with m.If(start & awake):
         sync += none_reported.eq(1)
+    one_before = (last_x + 1 == column) & (last_y == row)
     m.d.comb += [
-        Assert(~found | shown),
-        Assert(~found | ((sun_x + SUN_RUN <= size.columns) & (sun_y < size.rows))),
-        Assert(~none_reported | found | none),
-        # Needed for the induction.
-        Assert((column < size.columns) & (row < size.rows)),
-        Assert(store | (column == 0)),
-        Assert(~store | (d.writer_line_open & ~d.writer_line_full & d.line_seen)),
-        Assert(~store | (~d.writer_frame_full & ~d.writer_ack)),
-        Assert((d.awake == awake) & (awake | ~began) & (began | (~found & ~none_reported))),
-        Assert(d.searching == (began & ~found)),
-        Assert(~d.searching | (d.run < SUN_RUN)),
-        Assert(~d.searching | ~store | (column == 0) | (d.run == count)),
-        Assert(~d.searching | ~store | (column != 0) | (d.run == 0)),
-        Assert(~store | (column == 0) | (count == 0) | ((last_x + 1 == column) & (last_y == row))),
-        Assert(~store | (column == 0) | (count <= column)),
+        Assert(~found | shown, "the coordinates are those of the first three bright pixels"),
+        Assert(~found | ((sun_x + SUN_RUN <= size.columns) & (sun_y < size.rows)), AUXILIARY),
+        Assert(~none_reported | found | none, "without a Sun all bits of the coordinates are 1"),
+        Assert((column < size.columns) & (row < size.rows), AUXILIARY),
+        Assert(store | (column == 0), AUXILIARY),
+        Assert(~store | (d.writer_line_open & ~d.writer_line_full & d.line_seen), AUXILIARY),
+        Assert(~store | (~d.writer_frame_full & ~d.writer_ack), AUXILIARY),
+        Assert((d.awake == awake) & (awake | ~began), AUXILIARY),
+        Assert(began | (~found & ~none_reported), AUXILIARY),
+        Assert(d.searching == (began & ~found), AUXILIARY),
+        Assert(~d.searching | (d.run < SUN_RUN), AUXILIARY),
+        Assert(~d.searching | ~store | (column == 0) | (d.run == count), AUXILIARY),
+        Assert(~d.searching | ~store | (column != 0) | (d.run == 0), AUXILIARY),
+        Assert(~store | (column == 0) | (count == 0) | one_before, AUXILIARY),
+        Assert(~store | (column == 0) | (count <= column), AUXILIARY),
     ]
 
 
@@ -196,12 +197,11 @@ def _wraps(m: Module, d: SimpleNamespace) -> None:
     y = (d.y - size.window_above + j)[: len(d.y)]
     m.d.comb += [
         Assert(~d.window | ~begun | ((column == x) & (row == y))),
-        # Needed for the induction.
-        Assert(clocks <= 5),
-        Assert((i < size.window) & (d.in_window == (clocks >= 4))),
-        Assert((clocks >= 4) | (d.state == clocks)),
-        Assert(begun | ((j == 0) & (i == 0))),
-        Assert(~d.window | (clocks == 0) | ((d.at_column == x) & (d.at_row == y))),
+        Assert(clocks <= 5, AUXILIARY),
+        Assert((i < size.window) & (d.in_window == (clocks >= 4)), AUXILIARY),
+        Assert((clocks >= 4) | (d.state == clocks), AUXILIARY),
+        Assert(begun | ((j == 0) & (i == 0)), AUXILIARY),
+        Assert(~d.window | (clocks == 0) | ((d.at_column == x) & (d.at_row == y)), AUXILIARY),
     ]
 
 

@@ -15,7 +15,7 @@ from cubestack.hdl.cubesense.pair import CubeSensePair
 from cubestack.hdl.proofs import properties
 from cubestack.hdl.proofs.cubesense.designs import column_row, fpga, proof_design
 from cubestack.hdl.proofs.cubesense.edge import as_flown_proofs, edge_proofs
-from cubestack.hdl.proofs.properties import starts_in, wires_below, writer_wires
+from cubestack.hdl.proofs.properties import AUXILIARY, starts_in, wires_below, writer_wires
 from cubestack.hdl.proofs.prover import Proof, StuckWire
 
 # The address never leaves the image.
@@ -37,20 +37,22 @@ def _address_stays_inside(m: Module, d: SimpleNamespace) -> None:
     starts_in(m, d.EN)
     for source in _COUNTERS:
         m.d.comb += [
-            Assert(getattr(d, f"{source}_column") < size.columns),
-            Assert(getattr(d, f"{source}_row") < size.rows),
+            Assert(getattr(d, f"{source}_column") < size.columns, AUXILIARY),
+            Assert(getattr(d, f"{source}_row") < size.rows, AUXILIARY),
         ]
     m.d.comb += [
-        Assert(d.along < Mux(d.vertical, size.rows, size.columns)),
-        Assert(d.line < Mux(d.vertical, len(size.scan_columns), len(size.scan_rows))),
+        Assert(d.along < Mux(d.vertical, size.rows, size.columns), AUXILIARY),
+        Assert(d.line < Mux(d.vertical, len(size.scan_columns), len(size.scan_rows)), AUXILIARY),
     ]
     for position, before in ((d.right, size.window_left), (d.down, size.window_above)):
         m.d.comb += [
-            Assert(position.as_signed() >= -before),
-            Assert(position.as_signed() < size.window - before),
+            Assert(position.as_signed() >= -before, AUXILIARY),
+            Assert(position.as_signed() < size.window - before, AUXILIARY),
         ]
     column, row = column_row(d)
-    m.d.comb += [Assert(column < size.columns), Assert(row < size.rows)]
+    m.d.comb += Assert(
+        (column < size.columns) & (row < size.rows), "SRAM_A is inside of the picture"
+    )
 
 
 # Idle is reset.
@@ -84,7 +86,7 @@ _DRIVERS = {
 
 
 def _drivers(mcu_addressing: bool, m: Module, d: SimpleNamespace) -> None:
-    m.d.comb += Assert(d.CONTENTION == 0)
+    m.d.comb += Assert(d.CONTENTION == 0, "no wire has two drivers")
     for prefix in PREFIXES.values():
         properties.one_sram_driver(m, d, f"{prefix}SRAM")
     # Each combination of levels that the wires can tell from the others, listed or not.
@@ -97,10 +99,12 @@ def _drivers(mcu_addressing: bool, m: Module, d: SimpleNamespace) -> None:
         for side, action in table.actions(*levels, mcu_addressing=mcu_addressing)._asdict().items():
             data = getattr(d, f"{side}_DATA_OE") == (action in _DRIVES_DATA)
             link = getattr(d, f"{side}_LINK_D_OE") == (action in _DRIVES_LINK)
-            m.d.comb += Assert(~here | (data & link))
+            text = f"at levels {levels} the {side} FPGA drives what its action {action} needs"
+            m.d.comb += Assert(~here | (data & link), text)
     if mcu_addressing:
         microcontroller_may = (~d.SHIFT & ~d.RNW) | (d.SUNEN & d.NADEN)
-        m.d.comb += Assert(~microcontroller_may | ~d.DATA_OE)
+        text = "DATA is free while the microcontroller may drive it"
+        m.d.comb += Assert(~microcontroller_may | ~d.DATA_OE, text)
 
 
 # The address that the microcontroller sends is the one that is read.
@@ -125,10 +129,10 @@ def _takes_addresses(m: Module, d: SimpleNamespace) -> None:
         width = min(8 * known, bits)
         same &= (count != known) | (d.SRAM_A[:width] == taken[:width])
     m.d.comb += [
-        Assert(~d.addressing | same),
-        Assert(d.addressing == (d.take_address | d.read_from)),
-        Assert(~d.take_address | (d.SRAM_CE_N & ~d.DATA_OE)),
-        Assert(count <= ADDRESS_BYTES),
+        Assert(~d.addressing | same, "SRAM_A is the address that the microcontroller sent"),
+        Assert(d.addressing == (d.take_address | d.read_from), AUXILIARY),
+        Assert(~d.take_address | (d.SRAM_CE_N & ~d.DATA_OE), "no byte is read while it is sent"),
+        Assert(count <= ADDRESS_BYTES, AUXILIARY),
     ]
 
 

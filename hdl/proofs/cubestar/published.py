@@ -12,7 +12,7 @@ from cubestack.firmware_model.interface.pins import Pin
 from cubestack.hdl.cubestar.board import CubeStarBoard
 from cubestack.hdl.cubestar.top import CubeStarTop
 from cubestack.hdl.proofs import properties
-from cubestack.hdl.proofs.properties import starts_in, wires_below
+from cubestack.hdl.proofs.properties import AUXILIARY, starts_in, wires_below
 from cubestack.hdl.proofs.prover import Proof, StuckWire
 from cubestack.hdl.proofs.strides import stride_proof
 
@@ -44,15 +44,18 @@ def inside(address: Value, size: SimpleNamespace) -> Value:
 
 def _address_stays_inside(m: Module, d: SimpleNamespace) -> None:
     starts_in(m, ~d.ENABLE)
-    for position in (d.written, d.read, d.SRAM_A[:-1]):
-        m.d.comb += Assert(inside(position, d.size))
+    m.d.comb += [
+        Assert(inside(d.written, d.size), AUXILIARY),
+        Assert(inside(d.read, d.size), AUXILIARY),
+        Assert(inside(d.SRAM_A[:-1], d.size), "SRAM_A is inside of the picture"),
+    ]
 
 
 def bank_rests(pins: tuple[Pin, ...], m: Module, d: SimpleNamespace) -> None:
     """Standby of any board with one memory of two banks."""
     standby = ~d.ENABLE
     properties.outputs_rest(m, d, standby, pins, but=["SRAM_A"])
-    m.d.comb += Assert(~standby | (d.SRAM_A[:-1] == 0))
+    m.d.comb += Assert(~standby | (d.SRAM_A[:-1] == 0), "in standby SRAM_A is 0 but for the bank")
     properties.idle_is_reset(m, d, standby, {"bank"})
 
 
@@ -75,9 +78,9 @@ def _reads_in_order(m: Module, d: SimpleNamespace) -> None:
     bits = len(column)
     address = (d.SRAM_A[:bits] == column) & (d.SRAM_A[bits:-1] == row)
     m.d.comb += [
-        Assert(~reading | address),
-        Assert(byte == d.DATA),
-        Assert((d.column == column) & (d.row == row)),
+        Assert(~reading | address, "before the n-th data clock SRAM_A is that of the n-th pixel"),
+        Assert(byte == d.DATA, "DATA is the byte of the last data clock, and 0 before the first"),
+        Assert((d.column == column) & (d.row == row), AUXILIARY),
     ]
 
 

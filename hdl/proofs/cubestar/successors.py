@@ -11,18 +11,22 @@ from cubestack.hdl.cubestar.shared_top import CubeStarShared, CubeStarTwoBoards
 from cubestack.hdl.proofs import properties
 from cubestack.hdl.proofs.cubestar import published
 from cubestack.hdl.proofs.cubestar.published import inside
-from cubestack.hdl.proofs.properties import starts_in, writer_wires, written_is_driven
+from cubestack.hdl.proofs.properties import AUXILIARY, starts_in, writer_wires, written_is_driven
 from cubestack.hdl.proofs.prover import Proof, StuckWire
 from cubestack.hdl.proofs.strides import stride_proof
 
 _SHARED, _DOUBLE, _BOARDS = map(published.full, (CubeStarShared, CubeStarDouble, CubeStarTwoBoards))
 
 
+_INSIDE = "while storing {} is inside of the picture"
+_BUS_READ = "AD_LOW is driven only while the selected board is read"
+
+
 def _shared_address(m: Module, d: SimpleNamespace) -> None:
     starts_in(m, ~d.ENABLE)
     m.d.comb += [
-        Assert(inside(d.written, d.size)),
-        Assert((d.ENABLE & d.RNW) | inside(d.SRAM_A[:-1], d.size)),
+        Assert(inside(d.written, d.size), AUXILIARY),
+        Assert((d.ENABLE & d.RNW) | inside(d.SRAM_A[:-1], d.size), _INSIDE.format("SRAM_A")),
     ]
 
 
@@ -31,9 +35,9 @@ def _double_address(m: Module, d: SimpleNamespace) -> None:
     starts_in(m, ~d.ENABLE)
     storing = d.ENABLE & ~d.RNW
     m.d.comb += [
-        Assert(inside(d.written, d.size)),
-        Assert(~(storing & ~d.into) | inside(d.SRAM1_A, d.size)),
-        Assert(~(storing & d.into) | inside(d.SRAM2_A, d.size)),
+        Assert(inside(d.written, d.size), AUXILIARY),
+        Assert(~(storing & ~d.into) | inside(d.SRAM1_A, d.size), _INSIDE.format("SRAM1_A")),
+        Assert(~(storing & d.into) | inside(d.SRAM2_A, d.size), _INSIDE.format("SRAM2_A")),
     ]
 
 
@@ -55,22 +59,23 @@ def _double_idle(m: Module, d: SimpleNamespace) -> None:
     properties.outputs_rest(m, d, ~d.ENABLE, DOUBLE)
     for register in d.registers:
         if register.reset is not None:
-            m.d.comb += Assert(d.ENABLE | (register.value == register.reset))
+            text = f"in standby register {register.name} has its reset value"
+            m.d.comb += Assert(d.ENABLE | (register.value == register.reset), text)
 
 
 def _shared_drivers(m: Module, d: SimpleNamespace) -> None:
     written_is_driven(m, d)
     m.d.comb += [
         # The processor releases the data lines before it pulls RE_N low.
-        Assert(~d.AD_LOW_OE | (~d.RE_N & ~d.CS_N)),
-        Assert(~d.AD_LOW_OE | (d.ENABLE & d.RNW)),
+        Assert(~d.AD_LOW_OE | (~d.RE_N & ~d.CS_N), _BUS_READ),
+        Assert(~d.AD_LOW_OE | (d.ENABLE & d.RNW), "AD_LOW is driven only with ENABLE and RNW high"),
     ]
 
 
 def _double_drivers(m: Module, d: SimpleNamespace) -> None:
     written_is_driven(m, d, "SRAM1")
     written_is_driven(m, d, "SRAM2")
-    m.d.comb += Assert(~d.AD_LOW_OE | (~d.RE_N & ~d.CS_N & d.ENABLE))
+    m.d.comb += Assert(~d.AD_LOW_OE | (~d.RE_N & ~d.CS_N & d.ENABLE), _BUS_READ)
 
 
 def _apart(m: Module, d: SimpleNamespace) -> None:
@@ -95,7 +100,8 @@ def _apart(m: Module, d: SimpleNamespace) -> None:
 
 
 def _one_board_drives(m: Module, d: SimpleNamespace) -> None:
-    m.d.comb += Assert(~d.CONTENTION | (~d.BOARD1_CS_N & ~d.BOARD2_CS_N))
+    text = "with one board selected no other drives the bus"
+    m.d.comb += Assert(~d.CONTENTION | (~d.BOARD1_CS_N & ~d.BOARD2_CS_N), text)
 
 
 _STORES_INSIDE = "Storing never leaves the picture, at 1000 x 500 pixels, where it could"

@@ -25,7 +25,7 @@ examples:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("names", metavar="NAME", nargs="*", help="designs; default: all")
+    parser.add_argument("names", metavar="NAME", nargs="*", help="designs, or their first letters")
     add_flag(parser, "--json", "as JSON")
     add_flag(parser, "--ice40", "count iCE40 cells too; needs the extra hdl")
     add_flag(parser, "--fmax", "place on an iCE40 HX8K; needs the extra place")

@@ -5,7 +5,7 @@ import argparse
 from cubestack.hdl.flow.top import tops_in
 from cubestack.hdl.flow.verilog import verilog_file
 from cubestack.host.cli.arguments import add_path
-from cubestack.host.cli.hdl.choice import chosen
+from cubestack.host.cli.hdl.choice import one
 
 NAME = "verilog"
 
@@ -27,8 +27,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    (top,) = chosen(tops_in(args.tops()), [args.top], "top").values()
-    text = verilog_file(args.top, top)
+    name, top = one(tops_in(args.tops()), args.top, "top")
+    text = verilog_file(name, top)
     if args.out is None:
         print(text, end="")
     else:

@@ -1,6 +1,6 @@
-"""Waveforms of gateware tests that failed: finding one, showing it in a viewer or as text.
+"""Waveforms of failed tests and refuted proofs: finding one, showing it in a viewer or as text.
 
-The tests keep a VCD file and a JSON file about it; the end of the file is where the test failed.
+A VCD file has a JSON file about it beside it; the failure is where the waveform ends.
 """
 
 import json
@@ -8,7 +8,7 @@ import os
 import shutil
 import subprocess
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -32,8 +32,8 @@ class Trace(NamedTuple):
     moments: list[tuple[int, dict[str, str]]]
 
 
-def find(folder: Path, name: str) -> Path:
-    """The waveform of a test: a file, or the one in ``folder`` whose name or test has ``name``.
+def find(folders: Sequence[Path], name: str) -> Path:
+    """The waveform of a test: a file, or the one in a folder whose name or test has ``name``.
 
     FileNotFoundError when there is none, ValueError when there are several.
     """
@@ -41,11 +41,12 @@ def find(folder: Path, name: str) -> Path:
         if not Path(name).is_file():
             raise FileNotFoundError(f"there is no waveform {name}")
         return Path(name)
-    kept = sorted(folder.glob("*.vcd"))
+    kept = [path for folder in folders for path in sorted(folder.glob("*.vcd"))]
     found = [path for path in kept if name in path.name or name in _about(path).get("test", "")]
     if not found:
         there = ", ".join(path.stem for path in kept) or "none: no test failed there"
-        raise FileNotFoundError(f"{folder} has no waveform of {name!r}; there are {there}")
+        where = " and ".join(map(str, folders))
+        raise FileNotFoundError(f"{where} has no waveform of {name!r}; there are {there}")
     exact = found if len(found) == 1 else [path for path in found if path.stem == name]
     if len(exact) != 1:
         raise ValueError(f"{name!r} fits {', '.join(path.stem for path in found)}; say which")
@@ -56,9 +57,7 @@ def show(path: Path, count: int, internal: bool, text: bool) -> Iterator[str]:
     """Open ``path`` in a viewer if there is a screen and one is installed; else lines of text."""
     about = _about(path)
     if about:
-        yield (
-            f"{about['cocotb']} of {about['test']}, seed {about['seed']}, on {about['simulator']}"
-        )
+        yield about["title"]
         yield f"failed: {about['error'].strip() or 'without a word'}"
     viewer = next(filter(None, map(shutil.which, VIEWERS)), None)
     screen = "DISPLAY" in os.environ or "WAYLAND_DISPLAY" in os.environ

@@ -8,9 +8,9 @@ from ....conftest import Run
 
 
 def test_area_as_text(run: Run) -> None:
-    lines = run("hdl", "area", "cubestar", "Sun search").out.splitlines()
+    lines = run("hdl", "area", "cubestar", "frame gap").out.splitlines()
     assert "of 768" in lines[0]
-    assert [line[:10] for line in lines[1:]] == ["cubestar  ", "Sun search"]
+    assert [line[:10] for line in lines[1:]] == ["cubestar  ", "frame gap "]
 
 
 def test_area_as_json(run: Run) -> None:

@@ -10,9 +10,7 @@ from ....conftest import Run
 
 ABOUT = {
     "test": "tests/hdl/test_cubestar_top.py::test_stores[8-4-1]",
-    "cocotb": "whole_frame",
-    "seed": "1",
-    "simulator": "icarus",
+    "title": "whole_frame of tests/hdl/test_cubestar_top.py::test_stores[8-4-1], seed 1, on icarus",
     "error": "ACK is late",
 }
 
