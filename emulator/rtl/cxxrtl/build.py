@@ -25,7 +25,7 @@ SOURCES = ("*.cpp", "*.h", "pins_header.py", "clock_steps.py", "variants.py", "s
 
 def library_for(wiring: Wiring, folder: Path | None = None) -> Path:
     design = f"{_design_hash(wiring.component)}{pins_header(wiring, '')}{wiring.burst_levels}"
-    name = type(wiring.component).__name__
+    name = wiring.component.title
     return driver_library(name, design, partial(_compile, wiring), folder)
 
 

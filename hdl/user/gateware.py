@@ -1,0 +1,92 @@
+"""A user's design as a component with a device's pins."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from amaranth.hdl import Module
+
+from cubestack.firmware_model.interface.pins import Pin
+from cubestack.hdl.blocks.pinned import PinnedComponent, RtlilComponent, Stride, connect_ports
+from cubestack.hdl.flow.generate import rtlil_text
+from cubestack.hdl.user.classes import make_component
+from cubestack.hdl.user.source import ClassName, GatewareError, parse_source
+from cubestack.hdl.user.verilog import Parameters, convert_verilog
+
+
+class Gateware(RtlilComponent):
+    """A user's design.
+
+    Attributes:
+        notices: what a user must know of it, one line each.
+        is_verilog: only the compiled engine runs it.
+    """
+
+    def __init__(
+        self,
+        pins: Iterable[Pin],
+        title: str,
+        *,
+        rtlil: str = "",
+        component: PinnedComponent | None = None,
+        notices: tuple[str, ...] = (),
+    ) -> None:
+        super().__init__(pins)
+        self._MustUse__silence = True  # Amaranth need not elaborate it
+        self.notices = notices
+        self._title, self._rtlil, self._component = title, rtlil, component
+
+    @property
+    def title(self) -> str:
+        return self._title
+
+    @property
+    def is_verilog(self) -> bool:
+        return self._component is None
+
+    @property
+    def strides(self) -> tuple[Stride, ...]:
+        return ()
+
+    def rtlil(self, name: str) -> str:
+        """Its RTLIL, with the module ``name`` as the top."""
+        if self._component is not None:
+            return rtlil_text(self._component, name)
+        return self._rtlil.replace("module \\top\n", f"module \\{name}\n", 1)
+
+    def elaborate(self, platform: object) -> Module:
+        """For Amaranth's simulator; raises GatewareError for a design in Verilog."""
+        if self._component is None:
+            raise GatewareError(
+                f"{self.title} is Verilog, which the engine 'python' does not run; "
+                "use the compiled one"
+            )
+        m = Module()
+        m.submodules.design = self._component
+        ports = [(port.name, port.name) for pin in self.pins for port in pin.ports]
+        connect_ports(m, self._component, self, ports)
+        return m
+
+
+def load_gateware(
+    text: str, pins: Iterable[Pin], parameters: Parameters | None = None, folder: Path | None = None
+) -> Gateware:
+    """The design that ``text`` names, with the device's ``pins``.
+
+    Args:
+        text: FILE[:TOP], FILE,FILE...[:TOP], FOLDER[:TOP], LIST.f[:TOP] or MODULE:CLASS.
+        pins: the pin table, with the widths of the device.
+        parameters: parameters of the top module, or keyword arguments of the class.
+        folder: where relative paths start, and where a class's module may lie; by default the
+            current folder.
+
+    Raises:
+        GatewareError: the design can not be used; one line for each reason.
+        ToolMissingError: Verilog, and no whole Yosys.
+    """
+    pins, parameters = tuple(pins), dict(parameters or {})
+    source = parse_source(text, folder)
+    if isinstance(source, ClassName):
+        component = make_component(source, pins, parameters, folder)
+        return Gateware(pins, source.name, component=component)
+    converted = convert_verilog(source, pins, parameters)
+    return Gateware(pins, source.name, rtlil=converted.rtlil, notices=converted.notices)
