@@ -37,7 +37,7 @@ ORDER = {
         "i2cdev recording faults",
         "boards",
     ),
-    "hdl": ("blocks", "flow", "cubestar cubesense", "proofs"),
+    "hdl": ("blocks", "flow", "cubestar cubesense", "proofs", "user"),
     "firmware_model": (
         "values",
         "interface",
