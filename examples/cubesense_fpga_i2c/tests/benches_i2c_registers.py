@@ -18,11 +18,11 @@ from cubesense_fpga_i2c.register_table import (
     Register,
     command_byte,
 )
+from cubestack.hdl.contract.bench.camera import picture
+from cubestack.hdl.contract.bench.geometry import GEOMETRY
+from cubestack.hdl.contract.bench.testbench import timed_test
+from cubestack.hdl.contract.bench.timing import ODD, wait
 from tests.hdl.cubesense.reference import READ_OUT, SIDES
-from tests.hdl.harness.camera import picture
-from tests.hdl.harness.reference import GEOMETRY
-from tests.hdl.harness.testbench import timed_test
-from tests.hdl.harness.timing import ODD, wait
 
 FAST = 1_000_000
 ALL = (*ADDRESSES.values(), GROUP_ADDRESS)

@@ -7,11 +7,11 @@ from i2c_bench import STANDBY, I2cBench, read, store
 
 from cubesense_fpga_i2c.register_table import ADDRESSES, GROUP_ADDRESS, Register
 from cubestack.firmware_model.interface.cubesense.fpga import Action, Actions
+from cubestack.hdl.contract.bench.camera import flat, lines, picture
+from cubestack.hdl.contract.bench.geometry import GEOMETRY
+from cubestack.hdl.contract.bench.testbench import timed_test
 from tests.hdl.cubesense.pair import OTHER, frame
 from tests.hdl.cubesense.reference import NOT_FOUND, READ_OUT, SIDES
-from tests.hdl.harness.camera import flat, lines, picture
-from tests.hdl.harness.reference import GEOMETRY
-from tests.hdl.harness.testbench import timed_test
 
 FAST = 1_000_000
 COLUMNS, ROWS, GAP = READ_OUT.columns, READ_OUT.rows, READ_OUT.frame_gap

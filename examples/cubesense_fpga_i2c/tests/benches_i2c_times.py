@@ -10,10 +10,10 @@ from i2c_bench import STANDBY, I2cBench, read
 from i2c_bus import SPEEDS
 
 from cubesense_fpga_i2c.register_table import ADDRESSES, Register, pointer_bytes
+from cubestack.hdl.contract.bench.geometry import GEOMETRY
+from cubestack.hdl.contract.bench.testbench import timed_test
+from cubestack.hdl.contract.bench.timing import now
 from tests.hdl.cubesense.reference import READ_OUT, SIDES
-from tests.hdl.harness.reference import GEOMETRY
-from tests.hdl.harness.testbench import timed_test
-from tests.hdl.harness.timing import now
 
 
 async def read_at(bench: I2cBench, side: str, x: int, y: int, count: int, down: bool) -> bytes:

@@ -9,8 +9,8 @@ from cocotb.triggers import RisingEdge, Timer
 
 from cubesense_fpga_i2c.register_table import ADDRESSES, GROUP_ADDRESS, command_byte
 from cubestack.firmware_model.interface.cubesense.fpga import Action, Actions
+from cubestack.hdl.contract.bench.timing import now
 from tests.hdl.cubesense.reference import READ_OUT
-from tests.hdl.harness.timing import now
 
 PERIOD_PS = 10**6
 

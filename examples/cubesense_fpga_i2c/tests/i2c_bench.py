@@ -12,13 +12,13 @@ from i2c_model import FpgaModel
 
 from cubesense_fpga_i2c.register_table import RESET_COMMAND, Register, StatusBits, command_of
 from cubestack.firmware_model.interface.cubesense.fpga import COMMANDS, Action, Actions
+from cubestack.hdl.contract.bench.camera import Camera
+from cubestack.hdl.contract.bench.geometry import GEOMETRY
+from cubestack.hdl.contract.bench.sram import UNKNOWN, Sram
+from cubestack.hdl.contract.bench.timing import ODD, now, wait
+from cubestack.hdl.contract.bench.watching import Levels, levels, never_high, watch
 from tests.hdl.cubesense.pair import OTHER, PREFIXES, frame
 from tests.hdl.cubesense.reference import READ_OUT, SIDES, Controls, Half, behaviour
-from tests.hdl.harness.camera import Camera
-from tests.hdl.harness.reference import GEOMETRY
-from tests.hdl.harness.sram import UNKNOWN, Sram
-from tests.hdl.harness.timing import ODD, now, wait
-from tests.hdl.harness.watching import Levels, levels, never_high, watch
 
 STANDBY = Actions(Action.STANDBY, Action.STANDBY)
 

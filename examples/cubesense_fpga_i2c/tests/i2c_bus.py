@@ -21,7 +21,7 @@ from cubesense_fpga_i2c.register_table import (
     pointer_bytes,
 )
 from cubestack.firmware_model.interface.cubesense.fpga import Actions
-from tests.hdl.harness.timing import ODD, now, wait
+from cubestack.hdl.contract.bench.timing import ODD, now, wait
 
 SPEEDS = (100_000, 400_000, 1_000_000)
 

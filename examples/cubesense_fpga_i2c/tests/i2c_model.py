@@ -16,7 +16,7 @@ from cubesense_fpga_i2c.register_table import (
     command_of,
 )
 from cubestack.firmware_model.interface.cubesense.fpga import Action
-from tests.hdl.harness.reference import GEOMETRY
+from cubestack.hdl.contract.bench.geometry import GEOMETRY
 
 BY_NUMBER = {register.address: register for register in REGISTERS}
 STORING = (Action.STORE, Action.STORE_OTHER)

@@ -5,10 +5,10 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 from cubestack.firmware_model.interface.cubesense.fpga import Action
+from cubestack.hdl.contract.bench.geometry import Clock
 from tests.hdl.coverage.points import PAIRS, SEND_STATES, TAKE_STATES, hit, row_of
 from tests.hdl.cubesense import reference
 from tests.hdl.cubesense.reference import MCU_ADDRESSING, READ_OUT, SIDES, Controls, Half, Window
-from tests.hdl.harness.reference import Clock
 from tests.hdl.harness.store_states import left_in, read_state, steps
 
 #: The design that is simulated, or None for one that is no pair of ours.

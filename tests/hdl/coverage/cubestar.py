@@ -4,8 +4,10 @@ import os
 from collections.abc import Sequence
 from itertools import pairwise
 
+from cubestack.hdl.contract.bench.geometry import Clock
+from cubestack.hdl.contract.cubestar.board import Controls
 from tests.hdl.coverage.points import CUBESTAR, hit
-from tests.hdl.harness.reference import Clock, Controls, Window, windows
+from tests.hdl.harness.reference import Window, windows
 from tests.hdl.harness.store_states import left_in, read_state, steps
 
 #: The design that is simulated, or None for one that is no top of ours.

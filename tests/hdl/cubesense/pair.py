@@ -9,6 +9,13 @@ from typing import Any, ClassVar, Self
 import cocotb
 from cocotb.triggers import Timer
 
+from cubestack.hdl.contract.bench.camera import Camera, flat, lines, vsync
+from cubestack.hdl.contract.bench.geometry import GEOMETRY, Tick
+from cubestack.hdl.contract.bench.processor import Processor
+from cubestack.hdl.contract.bench.sram import UNKNOWN, Sram
+from cubestack.hdl.contract.bench.testbench import Testbench
+from cubestack.hdl.contract.bench.timing import ANY, ODD, Timing, wait
+from cubestack.hdl.contract.bench.watching import Levels, levels, never_high, watch
 from tests.hdl.coverage import cubesense as coverage
 from tests.hdl.cubesense.reference import (
     MCU_ADDRESSING,
@@ -19,13 +26,6 @@ from tests.hdl.cubesense.reference import (
     Half,
     behaviour,
 )
-from tests.hdl.harness.camera import Camera, flat, lines, vsync
-from tests.hdl.harness.processor import Processor
-from tests.hdl.harness.reference import GEOMETRY, Tick
-from tests.hdl.harness.sram import UNKNOWN, Sram
-from tests.hdl.harness.testbench import Testbench
-from tests.hdl.harness.timing import ANY, ODD, Timing, wait
-from tests.hdl.harness.watching import Levels, levels, never_high, watch
 
 Place = tuple[str, str]  #: Camera and memory
 

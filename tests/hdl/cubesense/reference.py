@@ -13,7 +13,8 @@ from typing import NamedTuple
 
 from cubestack.firmware_model.interface.cubesense import fpga
 from cubestack.firmware_model.interface.cubesense.fpga import SUN_RUN, SUN_THRESHOLD, Action
-from tests.hdl.harness.reference import GEOMETRY, Clock, Pulse, Tick, taken, write
+from cubestack.hdl.contract.bench.geometry import GEOMETRY, Clock, Pulse, Tick
+from tests.hdl.harness.reference import taken, write
 
 #: Settings of the simulation that imports this, from its environment.
 READ_OUT = fpga.ReadOut(**json.loads(os.environ["READ_OUT"]))

@@ -6,12 +6,12 @@ from typing import Any, ClassVar, NamedTuple
 
 import cocotb
 
+from cubestack.hdl.contract.bench.geometry import GEOMETRY
+from cubestack.hdl.contract.bench.sram import Sram
+from cubestack.hdl.contract.bench.timing import ANY, Timing
+from cubestack.hdl.contract.bench.watching import never_high
 from tests.hdl.cubestar.board import CubeStarTestbench
-from tests.hdl.harness.processor import Ebi
-from tests.hdl.harness.reference import GEOMETRY
-from tests.hdl.harness.sram import Sram
-from tests.hdl.harness.timing import ANY, Timing
-from tests.hdl.harness.watching import never_high
+from tests.hdl.harness.bus import Ebi
 
 MEMORY = GEOMETRY.bank_size
 

@@ -11,16 +11,16 @@ from typing import Any
 import cocotb
 from cocotb.triggers import Timer
 
+from cubestack.hdl.contract.bench.camera import picture
+from cubestack.hdl.contract.bench.geometry import GEOMETRY
+from cubestack.hdl.contract.bench.testbench import Testbench
+from cubestack.hdl.contract.bench.timing import ODD, PRESSURES, Timing, wait
 from tests.hdl.coverage.points import hit
-from tests.hdl.harness.camera import picture
-from tests.hdl.harness.reference import GEOMETRY
-from tests.hdl.harness.testbench import Testbench
-from tests.hdl.harness.timing import ODD, PRESSURES, Timing, wait
 
 MODULE, NAME = os.environ["TESTBENCH"].split(":")
 TESTBENCH: Any = getattr(import_module(MODULE), NAME)
 
-#: Slower than :func:`~tests.hdl.harness.testbench.timed_test` allows for: 1 MHz takes its time.
+#: Slower than :func:`timed_test` allows for: 1 MHz takes its time.
 slow_test = cocotb.test(timeout_time=300, timeout_unit="ms")
 
 

@@ -5,9 +5,9 @@ from typing import Any
 
 import cocotb
 
+from cubestack.hdl.contract.bench.timing import DATA_HALVES, fixed
 from tests.hdl.coverage.points import PHASES, PIXEL_MHZ, hit
 from tests.hdl.harness.any_top import TESTBENCH, slow_test, works
-from tests.hdl.harness.timing import DATA_HALVES, fixed
 
 
 @slow_test

@@ -4,72 +4,12 @@ Follows the wording of FrameWriter's, FrameReader's and CubeStarTop's docstrings
 whole frames at once, not clock by clock, so that it shares no structure with the design.
 """
 
-import os
 from collections.abc import Sequence
 from itertools import cycle, groupby, pairwise
 from typing import Any, NamedTuple
 
-
-class Geometry(NamedTuple):
-    """Frame of ``columns`` x ``rows`` pixels; the address is bank : row : column."""
-
-    columns: int
-    rows: int
-
-    @property
-    def pixels(self) -> int:
-        return self.columns * self.rows
-
-    @property
-    def position_bits(self) -> int:
-        return (self.columns - 1).bit_length() + (self.rows - 1).bit_length()
-
-    @property
-    def bank_size(self) -> int:
-        return 1 << self.position_bits
-
-    def address(self, column: int, row: int, bank: int = 0) -> int:
-        return bank * self.bank_size + (row << (self.columns - 1).bit_length()) + column
-
-    def addresses(self, bank: int = 0) -> list[int]:
-        return [self.address(x, y, bank) for y in range(self.rows) for x in range(self.columns)]
-
-
-GEOMETRY = Geometry(int(os.environ["FRAME_COLUMNS"]), int(os.environ["FRAME_ROWS"]))
-
-
-class Tick(NamedTuple):
-    """Camera pins at one rising edge of the pixel clock."""
-
-    pixel: int
-    hsync: int
-    vsync: int
-
-
-class Clock(NamedTuple):
-    """One period of the pixel clock: its two edges in ps, and the pins at the rising one."""
-
-    rise: int
-    fall: int
-    pins: Tick
-
-
-class Pulse(NamedTuple):
-    """One write pulse: WE_N low from ``start`` to ``end``, in ps."""
-
-    start: int
-    end: int
-    address: int
-    value: int
-
-
-class Controls(NamedTuple):
-    """Levels that the microcontroller drives, from ``time`` (ps) on."""
-
-    time: int
-    enable: int
-    rnw: int
-    bank: int
+from cubestack.hdl.contract.bench.geometry import Clock, Geometry, Pulse, Tick
+from cubestack.hdl.contract.cubestar.board import Controls
 
 
 class Window(NamedTuple):

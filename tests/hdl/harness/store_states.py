@@ -7,7 +7,7 @@ another point and no more.
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from tests.hdl.harness.reference import GEOMETRY, Clock, Tick
+from cubestack.hdl.contract.bench.geometry import GEOMETRY, Clock, Tick
 
 
 class Step(NamedTuple):

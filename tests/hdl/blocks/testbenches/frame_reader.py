@@ -6,8 +6,8 @@ from typing import Any
 import cocotb
 from cocotb.triggers import Timer
 
-from tests.hdl.harness.reference import GEOMETRY
-from tests.hdl.harness.timing import some_time
+from cubestack.hdl.contract.bench.geometry import GEOMETRY
+from cubestack.hdl.contract.bench.timing import some_time
 
 
 async def clock(dut: Any, memory: bytes, reset: int = 0) -> int:

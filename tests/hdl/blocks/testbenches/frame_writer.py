@@ -6,9 +6,10 @@ from typing import Any, NamedTuple
 
 import cocotb
 
-from tests.hdl.harness.camera import flat, frame, line, lines, picture, vsync
-from tests.hdl.harness.reference import GEOMETRY, Tick, taken
-from tests.hdl.harness.timing import clock
+from cubestack.hdl.contract.bench.camera import flat, frame, line, lines, picture, vsync
+from cubestack.hdl.contract.bench.geometry import GEOMETRY, Tick
+from cubestack.hdl.contract.bench.timing import clock
+from tests.hdl.harness.reference import taken
 
 
 class Seen(NamedTuple):

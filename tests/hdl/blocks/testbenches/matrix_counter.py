@@ -6,7 +6,7 @@ from typing import Any
 import cocotb
 from cocotb.triggers import Timer
 
-from tests.hdl.harness.reference import GEOMETRY
+from cubestack.hdl.contract.bench.geometry import GEOMETRY
 
 
 async def clock(dut: Any, **pins: int) -> tuple[int, int, int]:

@@ -8,12 +8,12 @@ from cocotb.triggers import Timer
 from cocotb.types import LogicArray
 
 from cubestack.firmware_model.interface.cubesense.fpga import ADDRESS_BYTES, address_bytes
+from cubestack.hdl.contract.bench.geometry import GEOMETRY
+from cubestack.hdl.contract.bench.testbench import checked_test, timed_test
+from cubestack.hdl.contract.bench.timing import ODD, wait
+from cubestack.hdl.contract.bench.watching import levels
 from tests.hdl.cubesense.pair import OTHER, PREFIXES, PairTestbench, enables
 from tests.hdl.cubesense.reference import READ_OUT, SIDES
-from tests.hdl.harness.reference import GEOMETRY
-from tests.hdl.harness.testbench import checked_test, timed_test
-from tests.hdl.harness.timing import ODD, wait
-from tests.hdl.harness.watching import levels
 
 COLUMNS, ROWS = READ_OUT.columns, READ_OUT.rows
 CORNERS = [(x, y) for x in (0, COLUMNS - 1) for y in (0, ROWS - 1)]

@@ -7,12 +7,12 @@ from typing import Any, Self
 
 import cocotb
 
+from cubestack.hdl.contract.bench.camera import flat, line, vsync
+from cubestack.hdl.contract.bench.geometry import GEOMETRY, Tick
+from cubestack.hdl.contract.bench.testbench import checked_test
+from cubestack.hdl.contract.bench.watching import stays_in_the_picture
 from tests.hdl.cubesense.pair import PREFIXES, PairTestbench
 from tests.hdl.cubesense.reference import READ_OUT, SIDES
-from tests.hdl.harness.camera import flat, line, vsync
-from tests.hdl.harness.reference import GEOMETRY, Tick
-from tests.hdl.harness.testbench import checked_test
-from tests.hdl.harness.watching import stays_in_the_picture
 
 COLUMNS, ROWS, GAP = READ_OUT.columns, READ_OUT.rows, READ_OUT.frame_gap
 WAYS = list(product(SIDES, SIDES))

@@ -5,10 +5,10 @@ from typing import Any
 
 import cocotb
 
+from cubestack.hdl.contract.bench.testbench import timed_test
 from tests.hdl.coverage.points import hit
 from tests.hdl.cubesense.pair import OTHER, SIDES, PairTestbench, coordinates, window_of, with_sun
 from tests.hdl.cubesense.reference import READ_OUT
-from tests.hdl.harness.testbench import timed_test
 
 COLUMNS, ROWS = READ_OUT.columns, READ_OUT.rows
 

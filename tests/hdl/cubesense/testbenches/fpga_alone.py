@@ -6,9 +6,9 @@ from typing import Any
 
 from cocotb.triggers import Timer
 
-from tests.hdl.harness.reference import GEOMETRY
-from tests.hdl.harness.testbench import timed_test
-from tests.hdl.harness.watching import disturb_in_standby, levels
+from cubestack.hdl.contract.bench.geometry import GEOMETRY
+from cubestack.hdl.contract.bench.testbench import timed_test
+from cubestack.hdl.contract.bench.watching import disturb_in_standby, levels
 
 CONTROLS = ("RNW", "CLK", "EDGE", "SHIFT")
 INPUTS = ("Y", "HREF", "PCLK", *CONTROLS, "LINK_D_I", "LINK_C_I", "SRAM_D_I")

@@ -5,8 +5,8 @@ from typing import Any
 
 import cocotb
 
+from cubestack.hdl.contract.bench.timing import clock, some_time
 from tests.hdl.cubesense.reference import READ_OUT, vsync
-from tests.hdl.harness.timing import clock, some_time
 
 GAP = READ_OUT.frame_gap
 

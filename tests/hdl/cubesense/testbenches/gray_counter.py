@@ -5,8 +5,8 @@ from typing import Any
 
 import cocotb
 
+from cubestack.hdl.contract.bench.timing import clock
 from tests.hdl.cubesense.reference import READ_OUT
-from tests.hdl.harness.timing import clock
 
 POSITIONS = READ_OUT.pixels
 

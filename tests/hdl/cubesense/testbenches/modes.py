@@ -7,12 +7,12 @@ from typing import Any
 from cocotb.triggers import Timer
 
 from cubestack.firmware_model.interface.cubesense.fpga import Action, actions, link_shows_enables
+from cubestack.hdl.contract.bench.camera import picture
+from cubestack.hdl.contract.bench.testbench import checked_test, timed_test
+from cubestack.hdl.contract.bench.timing import ODD, wait
+from cubestack.hdl.contract.bench.watching import disturb_in_standby, levels
 from tests.hdl.cubesense.pair import PREFIXES, STANDBY, PairTestbench, frame
 from tests.hdl.cubesense.reference import MCU_ADDRESSING
-from tests.hdl.harness.camera import picture
-from tests.hdl.harness.testbench import checked_test, timed_test
-from tests.hdl.harness.timing import ODD, wait
-from tests.hdl.harness.watching import disturb_in_standby, levels
 
 #: Idle times in ps, from a glitch to a few clocks.
 MOMENTS = (1, 100, 3_000, 20_000, 100_000, 1_000_000)

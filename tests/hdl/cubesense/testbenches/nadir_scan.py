@@ -5,9 +5,9 @@ from typing import Any
 
 import cocotb
 
+from cubestack.hdl.contract.bench.geometry import GEOMETRY
+from cubestack.hdl.contract.bench.timing import clock
 from tests.hdl.cubesense.reference import READ_OUT
-from tests.hdl.harness.reference import GEOMETRY
-from tests.hdl.harness.timing import clock
 
 COLUMNS, ROWS = READ_OUT.columns, READ_OUT.rows
 

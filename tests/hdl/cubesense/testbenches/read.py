@@ -4,11 +4,11 @@ import os
 import random
 from itertools import product
 
+from cubestack.hdl.contract.bench.camera import picture
+from cubestack.hdl.contract.bench.geometry import GEOMETRY
+from cubestack.hdl.contract.bench.testbench import checked_test
 from tests.hdl.cubesense.pair import OTHER, PairTestbench, frame, window_of, with_sun
 from tests.hdl.cubesense.reference import NOT_FOUND, READ_OUT, SIDES
-from tests.hdl.harness.camera import picture
-from tests.hdl.harness.reference import GEOMETRY
-from tests.hdl.harness.testbench import checked_test
 
 COLUMNS, ROWS = READ_OUT.columns, READ_OUT.rows
 

@@ -7,13 +7,13 @@ from itertools import product
 from cocotb.triggers import Timer
 
 from cubestack.firmware_model.interface.cubesense.fpga import ADDRESSING_COMMANDS, COMMANDS, Action
+from cubestack.hdl.contract.bench.camera import flat, line, lines, picture
+from cubestack.hdl.contract.bench.geometry import GEOMETRY, Tick
+from cubestack.hdl.contract.bench.testbench import checked_test
 from tests.hdl.coverage.cubesense import TOP
 from tests.hdl.coverage.points import GROUPS
 from tests.hdl.cubesense.pair import OTHER, PairTestbench, frame, gap
 from tests.hdl.cubesense.reference import MCU_ADDRESSING, READ_OUT
-from tests.hdl.harness.camera import flat, line, lines, picture
-from tests.hdl.harness.reference import GEOMETRY, Tick
-from tests.hdl.harness.testbench import checked_test
 
 COLUMNS, ROWS, GAP = READ_OUT.columns, READ_OUT.rows, READ_OUT.frame_gap
 ROWS_OF_TABLE = COMMANDS[1:] + ADDRESSING_COMMANDS * MCU_ADDRESSING

@@ -4,11 +4,11 @@ import random
 from itertools import product
 from typing import Any
 
+from cubestack.hdl.contract.bench.camera import flat, line, lines, picture
+from cubestack.hdl.contract.bench.geometry import GEOMETRY
+from cubestack.hdl.contract.bench.testbench import checked_test, timed_test
 from tests.hdl.cubesense.pair import OTHER, PREFIXES, PairTestbench, coordinates, frame, with_sun
 from tests.hdl.cubesense.reference import NOT_FOUND, READ_OUT, SIDES
-from tests.hdl.harness.camera import flat, line, lines, picture
-from tests.hdl.harness.reference import GEOMETRY
-from tests.hdl.harness.testbench import checked_test, timed_test
 
 COLUMNS, ROWS, GAP = READ_OUT.columns, READ_OUT.rows, READ_OUT.frame_gap
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import cocotb
 
+from cubestack.hdl.contract.bench.geometry import GEOMETRY
+from cubestack.hdl.contract.bench.timing import clock
 from tests.hdl.cubesense.reference import NOT_FOUND, READ_OUT
-from tests.hdl.harness.reference import GEOMETRY
-from tests.hdl.harness.timing import clock
 
 COLUMNS, ROWS = READ_OUT.columns, READ_OUT.rows
 BRIGHT, DARK = (200, 201, 255), (0, 199, 128)

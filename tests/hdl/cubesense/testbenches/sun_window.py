@@ -6,9 +6,9 @@ from typing import Any
 
 import cocotb
 
+from cubestack.hdl.contract.bench.geometry import GEOMETRY
+from cubestack.hdl.contract.bench.timing import clock
 from tests.hdl.cubesense.reference import NOT_FOUND, READ_OUT
-from tests.hdl.harness.reference import GEOMETRY
-from tests.hdl.harness.timing import clock
 
 COLUMNS, ROWS, SIZE = READ_OUT.columns, READ_OUT.rows, READ_OUT.window
 PLACES = list(product(range(NOT_FOUND[0] + 1), range(NOT_FOUND[1] + 1)))

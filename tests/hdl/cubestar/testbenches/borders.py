@@ -5,11 +5,11 @@ from collections.abc import Iterable
 
 import cocotb
 
+from cubestack.hdl.contract.bench.camera import flat, frame, line, lines, picture
+from cubestack.hdl.contract.bench.geometry import GEOMETRY, Tick
+from cubestack.hdl.contract.bench.testbench import checked_test
+from cubestack.hdl.contract.bench.watching import stays_in_the_picture
 from tests.hdl.cubestar.board import PublishedTestbench
-from tests.hdl.harness.camera import flat, frame, line, lines, picture
-from tests.hdl.harness.reference import GEOMETRY, Tick
-from tests.hdl.harness.testbench import checked_test
-from tests.hdl.harness.watching import stays_in_the_picture
 
 COLUMNS, ROWS = GEOMETRY
 

@@ -5,12 +5,12 @@ import random
 import cocotb
 from cocotb.triggers import Timer
 
+from cubestack.hdl.contract.bench.camera import picture
+from cubestack.hdl.contract.bench.testbench import checked_test
+from cubestack.hdl.contract.bench.timing import ODD, SLOWEST_ACCESS, wait
+from cubestack.hdl.contract.bench.watching import levels
 from tests.hdl.cubestar.next_version import MEMORY, BusTestbench
 from tests.hdl.harness.any_top import TESTBENCH
-from tests.hdl.harness.camera import picture
-from tests.hdl.harness.testbench import checked_test
-from tests.hdl.harness.timing import ODD, SLOWEST_ACCESS, wait
-from tests.hdl.harness.watching import levels
 
 
 async def works_on(bench: BusTestbench, accesses: int, *memories: int) -> None:

@@ -4,10 +4,10 @@ import random
 
 from cocotb.triggers import Timer
 
+from cubestack.hdl.contract.bench.camera import picture
+from cubestack.hdl.contract.bench.testbench import checked_test
 from tests.hdl.cubestar.next_version import DoubleTestbench
 from tests.hdl.cubestar.testbenches.bus import works_on
-from tests.hdl.harness.camera import picture
-from tests.hdl.harness.testbench import checked_test
 
 
 async def fills(bench: DoubleTestbench, memory: int) -> None:

@@ -6,8 +6,8 @@ from typing import Any
 import cocotb
 from cocotb.triggers import First, RisingEdge, Timer
 
-from tests.hdl.harness.reference import GEOMETRY
-from tests.hdl.harness.watching import levels
+from cubestack.hdl.contract.bench.geometry import GEOMETRY
+from cubestack.hdl.contract.bench.watching import levels
 
 
 @cocotb.test()

@@ -9,11 +9,11 @@ from typing import Any
 import cocotb
 from cocotb.triggers import FallingEdge, Timer
 
+from cubestack.hdl.contract.bench.camera import flat, frame, lines, picture
+from cubestack.hdl.contract.bench.geometry import GEOMETRY
+from cubestack.hdl.contract.bench.testbench import checked_test, timed_test
+from cubestack.hdl.contract.bench.watching import disturb_in_standby, levels
 from tests.hdl.cubestar.board import PublishedTestbench
-from tests.hdl.harness.camera import flat, frame, lines, picture
-from tests.hdl.harness.reference import GEOMETRY
-from tests.hdl.harness.testbench import checked_test, timed_test
-from tests.hdl.harness.watching import disturb_in_standby, levels
 
 #: Idle times in ps, from a glitch to a few clocks.
 MOMENTS = (1, 100, 3_000, 20_000, 100_000, 1_000_000)

@@ -7,12 +7,12 @@ from typing import Any
 import cocotb
 from cocotb.triggers import FallingEdge, RisingEdge
 
+from cubestack.hdl.contract.bench.camera import frame, picture
+from cubestack.hdl.contract.bench.geometry import GEOMETRY
+from cubestack.hdl.contract.bench.testbench import checked_test, timed_test
+from cubestack.hdl.contract.bench.timing import ODD, wait
 from tests.hdl.coverage.cubestar import STOPPED
 from tests.hdl.cubestar.board import PublishedTestbench
-from tests.hdl.harness.camera import frame, picture
-from tests.hdl.harness.reference import GEOMETRY
-from tests.hdl.harness.testbench import checked_test, timed_test
-from tests.hdl.harness.timing import ODD, wait
 
 
 @timed_test

@@ -4,9 +4,9 @@ from typing import Any
 
 from cocotb.triggers import Timer
 
+from cubestack.hdl.contract.bench.testbench import timed_test
+from cubestack.hdl.contract.bench.watching import disturb_in_standby
 from tests.hdl.cubestar.next_version import MEMORY, SharedTestbench
-from tests.hdl.harness.testbench import timed_test
-from tests.hdl.harness.watching import disturb_in_standby
 
 
 @timed_test

@@ -4,12 +4,12 @@ import random
 
 from cocotb.triggers import Timer
 
+from cubestack.hdl.contract.bench.camera import flat, frame, line, lines, picture, vsync
+from cubestack.hdl.contract.bench.geometry import GEOMETRY, Tick
+from cubestack.hdl.contract.bench.testbench import checked_test
 from tests.hdl.coverage.points import GROUPS
 from tests.hdl.cubestar.board import CubeStarTestbench
 from tests.hdl.harness.any_top import TESTBENCH, works
-from tests.hdl.harness.camera import flat, frame, line, lines, picture, vsync
-from tests.hdl.harness.reference import GEOMETRY, Tick
-from tests.hdl.harness.testbench import checked_test
 
 COLUMNS, ROWS = GEOMETRY
 

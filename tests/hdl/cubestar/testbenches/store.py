@@ -7,10 +7,10 @@ a test asserts besides says in plain words what that must have come to.
 import random
 from typing import Any
 
+from cubestack.hdl.contract.bench.camera import flat, frame, line, lines, picture, vsync
+from cubestack.hdl.contract.bench.geometry import GEOMETRY, Tick
+from cubestack.hdl.contract.bench.testbench import checked_test, timed_test
 from tests.hdl.cubestar.board import PublishedTestbench
-from tests.hdl.harness.camera import flat, frame, line, lines, picture, vsync
-from tests.hdl.harness.reference import GEOMETRY, Tick
-from tests.hdl.harness.testbench import checked_test, timed_test
 
 COLUMNS, ROWS = GEOMETRY
 TIMES = 4  # repetitions of a case, each with new pictures, blanking and moments

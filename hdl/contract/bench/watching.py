@@ -7,8 +7,8 @@ from typing import Any
 import cocotb
 from cocotb.triggers import ReadOnly
 
-from tests.hdl.harness.reference import GEOMETRY
-from tests.hdl.harness.timing import ODD, now, wait
+from cubestack.hdl.contract.bench.geometry import GEOMETRY
+from cubestack.hdl.contract.bench.timing import ODD, now, wait
 
 Levels = list[tuple[int, int]]  #: (time in ps, level) whenever a pin has changed
 

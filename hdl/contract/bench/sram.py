@@ -8,8 +8,8 @@ import cocotb
 from cocotb.triggers import Event, FallingEdge, First, ReadOnly, Timer
 from cocotb.types import LogicArray
 
-from tests.hdl.harness.reference import GEOMETRY, Pulse
-from tests.hdl.harness.timing import SLOWEST_ACCESS, now
+from cubestack.hdl.contract.bench.geometry import GEOMETRY, Pulse
+from cubestack.hdl.contract.bench.timing import SLOWEST_ACCESS, now
 
 UNKNOWN = LogicArray("X" * 8)
 

@@ -9,8 +9,8 @@ from typing import Any, TypeVar
 
 from cocotb.triggers import Event, FallingEdge, RisingEdge
 
-from tests.hdl.harness.reference import GEOMETRY, Clock, Tick
-from tests.hdl.harness.timing import ANY, EVEN, Timing, between, now, wait
+from cubestack.hdl.contract.bench.geometry import GEOMETRY, Clock, Tick
+from cubestack.hdl.contract.bench.timing import ANY, EVEN, Timing, between, now, wait
 
 T = TypeVar("T")
 

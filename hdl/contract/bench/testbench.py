@@ -7,10 +7,10 @@ from typing import Any, ClassVar, Generic, Self, TypeVar
 
 import cocotb
 
-from tests.hdl.harness.camera import Camera, patience, picture
-from tests.hdl.harness.reference import Tick
-from tests.hdl.harness.sram import Sram
-from tests.hdl.harness.timing import ANY, Timing
+from cubestack.hdl.contract.bench.camera import Camera, patience, picture
+from cubestack.hdl.contract.bench.geometry import Tick
+from cubestack.hdl.contract.bench.sram import Sram
+from cubestack.hdl.contract.bench.timing import ANY, Timing
 
 P = TypeVar("P")
 B = TypeVar("B", bound="Testbench[Any]")

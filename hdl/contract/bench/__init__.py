@@ -1,0 +1,1 @@
+"""What surrounds a design in a testbench: camera, SRAM, processor and their rates."""

@@ -1,0 +1,1 @@
+"""The contract of CubeStar's published board."""
