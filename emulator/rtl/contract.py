@@ -349,6 +349,26 @@ class RtlEngine(ABC):
             outputs[row] = [self._get(name) for name in pins]
         return outputs
 
+    def replay(
+        self,
+        times_ps: NDArray[np.int64],
+        pins: Sequence[str],
+        numbers: NDArray[np.int32],
+        levels: NDArray[np.uint32],
+        watched: Sequence[str],
+    ) -> NDArray[np.uint32]:
+        """``apply`` of many events as arrays: event n sets ``pins[numbers[n]]``.
+
+        No camera may be attached. Returns the settled levels of the pins ``watched`` after each
+        event, shape (events, watched).
+        """
+        outputs = np.zeros((len(times_ps), len(watched)), np.uint32)
+        events = zip(times_ps.tolist(), numbers.tolist(), levels.tolist(), strict=True)
+        for row, (time_ps, number, level) in enumerate(events):
+            self.apply([PinEvent(time_ps, pins[number], level)])
+            outputs[row] = [self._get(name) for name in watched]
+        return outputs
+
     def _named(self, name: str | None) -> _Camera:
         for camera in self._cameras:
             if name in (None, camera.pins.name):

@@ -6,6 +6,8 @@ output enable. The CubeStar thesis (section 5.2.2) names only the maker and the 
 
 import logging
 from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
@@ -94,6 +96,16 @@ class ViolationLog:
         self.counts[violation.kind] += 1
         if self.counts[violation.kind] <= MAX_VIOLATIONS:
             self.kept.append(violation)
+
+
+@contextmanager
+def no_log() -> Iterator[None]:
+    """Keep violations out of the Python log, in runs that repeat one that was reported."""
+    before, _log.disabled = _log.disabled, True
+    try:
+        yield
+    finally:
+        _log.disabled = before
 
 
 class SramPins(NamedTuple):

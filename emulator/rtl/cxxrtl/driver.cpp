@@ -184,6 +184,16 @@ void driver_set(Driver *driver, int32_t pin, uint32_t value, int64_t now) {
 
 uint32_t driver_get(const Driver *driver, int32_t pin) { return PIN_TABLE[pin].get(driver->top); }
 
+// Drives `count` pins, each at its time, and writes the levels of `watched` after each to `out`.
+void driver_replay(Driver *driver, int64_t count, const int64_t *times, const int32_t *pins,
+                   const uint32_t *levels, int32_t watched, const int32_t *outputs, uint32_t *out) {
+    for (int64_t n = 0; n < count; n++) {
+        driver->set(PIN_TABLE[pins[n]], levels[n], times[n]);
+        for (int32_t k = 0; k < watched; k++)
+            *out++ = PIN_TABLE[outputs[k]].get(driver->top);
+    }
+}
+
 // Name and width of register number `index`; null after the last one.
 const char *driver_register(int32_t index, int32_t *bits) {
     if (index < 0 || index >= REGISTER_COUNT)

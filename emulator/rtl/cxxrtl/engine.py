@@ -33,6 +33,7 @@ _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "driver_clocks_at_once": (_LONG, (_POINTER,)),
     "driver_set": (None, (_POINTER, _INT, ctypes.c_uint32, _LONG)),
     "driver_get": (ctypes.c_uint32, (_POINTER, _INT)),
+    "driver_replay": (None, (_POINTER, _LONG, *[_POINTER] * 3, _INT, *[_POINTER] * 2)),
     "driver_register": (ctypes.c_char_p, (_INT, _INT_OUT)),
     "driver_flip": (None, (_POINTER, _INT, _INT, _LONG)),
     "driver_state": (_LONG, (_POINTER, _POINTER)),
@@ -156,6 +157,36 @@ class CompiledEngine(RtlEngine):
 
     def _get(self, name: str) -> int:
         return int(self._library.driver_get(self._handle, self._pins[name]))
+
+    def replay(
+        self,
+        times_ps: NDArray[np.int64],
+        pins: Sequence[str],
+        numbers: NDArray[np.int32],
+        levels: NDArray[np.uint32],
+        watched: Sequence[str],
+    ) -> NDArray[np.uint32]:
+        if self._upsets or any(camera.source is not None for camera in self._cameras):
+            return super().replay(times_ps, pins, numbers, levels, watched)
+        out = np.zeros((len(times_ps), len(watched)), np.uint32)
+        if not len(times_ps):
+            return out
+        self.run(int(times_ps[0]))
+        outputs = np.array([self._pins[name] for name in watched], np.int32)
+        driven = np.array([self._pins[name] for name in pins], np.int32)[numbers]
+        arrays = [np.ascontiguousarray(a) for a in (times_ps, driven, levels)]
+        self._library.driver_replay(
+            self._handle,
+            len(times_ps),
+            *(array.ctypes.data for array in arrays),
+            len(watched),
+            outputs.ctypes.data,
+            out.ctypes.data,
+        )
+        self._idle = False
+        self.now_ps = int(times_ps[-1])
+        self._collect_violations()
+        return out
 
     def _power(self, memory: int, on: bool) -> None:
         self._library.driver_power(self._handle, memory, on, self.now_ps)

@@ -16,12 +16,12 @@ from collections.abc import Callable, Mapping
 from cubestack.hdl.flow.top import TopTable
 from cubestack.hdl.proofs.prover import Proof
 from cubestack.host.cli.arguments import Parser
-from cubestack.host.cli.hdl import area, prove, verilog, wave
+from cubestack.host.cli.hdl import area, compare, prove, verilog, wave
 from cubestack.host.devices.registry import merged_tables
 
 #: One module per action, in the order of the help. Each has NAME, HELP, DESCRIPTION,
 #: ``add_arguments`` and ``run``.
-ACTIONS = (area, verilog, prove, wave)
+ACTIONS = (area, verilog, prove, wave, compare)
 
 
 def _all_tops() -> TopTable:
