@@ -86,7 +86,8 @@ def compare(
     skew_ps: int,
 ) -> Comparison:
     """Compare each pin; levels may differ for up to ``skew_ps`` at a time."""
-    bits, differences = {}, []
+    bits = {}
+    differences: list[Difference] = []
     for pin, output in outputs.items():
         bits[pin] = int(np.bitwise_or.reduce(output.comparable)) & captured[pin].bits
         differences += _differences(pin, captured[pin], output, times, end_ps, skew_ps)
@@ -119,4 +120,4 @@ def _differences(
 
 
 def _changes(levels: Levels) -> NDArray[np.bool_]:
-    return np.diff(levels, prepend=levels[:1] ^ 1) != 0
+    return np.asarray(np.diff(levels, prepend=levels[:1] ^ 1) != 0)

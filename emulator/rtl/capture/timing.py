@@ -31,7 +31,8 @@ class Wave(NamedTuple):
 
     def _edges(self, level: int) -> Times:
         moved = np.flatnonzero(self.levels[1:] != self.levels[:-1]) + 1
-        return self.times[moved[self.levels[moved] == level]]
+        chosen: Times = self.times[moved[self.levels[moved] == level]]
+        return chosen
 
     def moves(self) -> Times:
         return self.times[np.flatnonzero(np.diff(self.levels) != 0) + 1]

@@ -44,13 +44,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", type=Path, metavar="FILE", help="capture: VCD or CSV")
     names = [device.name for device in devices() if device.has_fpga]
     parser.add_argument("--device", required=True, choices=names, help="the real board's")
-    pairs = {"action": "append", "default": [], "type": _pair}
-    parser.add_argument(
-        "--map", **pairs, metavar="CHANNEL=PIN", help="pin of a channel, '-' for none; * matches"
-    )
-    parser.add_argument(
-        "--hold", **pairs, metavar="PIN=LEVEL", help="level of an input that was not captured"
-    )
+    for name, metavar, meaning in (
+        ("--map", "CHANNEL=PIN", "pin of a channel, '-' for none; * matches any letters"),
+        ("--hold", "PIN=LEVEL", "level of an input that was not captured, hexadecimal"),
+    ):
+        parser.add_argument(
+            name, action="append", default=[], type=_pair, metavar=metavar, help=meaning
+        )
     add_value(
         parser,
         "skew",
@@ -62,6 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             metavar="NS",
         ),
     )
+    add_flag(parser, "--from-power-up", "the capture begins when the FPGA is powered up")
     add_value(
         parser, "last", whole(10, "changes shown before the first difference", 1, metavar="N")
     )

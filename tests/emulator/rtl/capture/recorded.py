@@ -105,7 +105,7 @@ def write_vcd(
             text.append(f"#{time}")
         now = time
         text.append(change)
-    text.append(f"#{int(waves.times[-1])}")
+    text.append(f"#{max(now or 0, int(waves.times[-1]))}")
     path.write_text("\n".join(text) + "\n")
     return path
 
