@@ -30,6 +30,12 @@ RATE_SHIFT = 8
 CLOSE = 0.01
 """Largest relative difference between rates that count as equal."""
 
+FLOATING = 0xFF
+"""Byte that a master reads from I2C lines that nobody pulls low."""
+
+ASKING = OutgoingKind.I2C_START, OutgoingKind.I2C_WRITE, OutgoingKind.I2C_READ
+"""Messages of an I2C master that wait for an answer."""
+
 PARITIES: tuple[Parity, ...] = ("N", "N", "E", "O")
 STOPS = (1.0, 1.0, 1.5, 2.0)
 """By the field of USART_FRAME; half a stop bit counts as one."""
@@ -168,10 +174,12 @@ class CameraWire:
     _read: bytes = field(default=b"", init=False)
 
     def handle(self, machine: Machine, one: Outgoing) -> None:
-        """Handle an output ``Kind.I2C_*`` of the machine, if it concerns these pins."""
-        if one.unit >> 8 != self.sda:
-            return
+        """Handle an output ``Kind.I2C_*`` of the machine; nobody answers on any other pins."""
         unit = one.unit & 0xFF
+        if one.unit >> 8 != self.sda:
+            if one.kind in ASKING:
+                machine.i2c_answer(unit, False, FLOATING)
+            return
         match one.kind:
             case OutgoingKind.I2C_START:
                 self._finish(one.time_ps)
@@ -195,10 +203,10 @@ class CameraWire:
         return answers
 
     def _next(self, now_ps: int) -> int:
-        """The camera's next byte; 0xFF, from the pull-up, if it does not answer."""
+        """The camera's next byte; ``FLOATING`` if it does not answer."""
         if not self._read:
             self._read = self.camera.i2c_read(self._address, self.camera.word_bytes, now_ps) or b""
-        byte, self._read = (self._read[0], self._read[1:]) if self._read else (0xFF, b"")
+        byte, self._read = (self._read[0], self._read[1:]) if self._read else (FLOATING, b"")
         return byte
 
     def _finish(self, now_ps: int) -> None:

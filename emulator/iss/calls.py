@@ -79,13 +79,18 @@ class Calls:
     def _run(self, marks: Mapping[int, Callable[[int, int], None]]) -> None:
         machine = self.machine
         machine.breakpoints |= set(marks)
+        end_ps = machine.now_ps + LONGEST_PS
         try:
             while True:
-                stop = machine.run(machine.now_ps + LONGEST_PS)
+                stop = machine.run(end_ps)
                 place = machine.register("pc")
-                if stop.reason is StopReason.OUTBOX:
+                if stop.sends:
                     list(machine.outbox())
-                elif stop.reason is not StopReason.BREAKPOINT:
+                if stop.reason is StopReason.OUTBOX or (
+                    stop.reason is StopReason.TIME and stop.now_ps < end_ps
+                ):
+                    continue
+                if stop.reason is not StopReason.BREAKPOINT:
                     raise CallError(f"the call ended at {place:#x}: {stop.reason.name.lower()}")
                 elif place == self._end:
                     return

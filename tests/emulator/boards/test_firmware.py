@@ -122,13 +122,21 @@ def test_other_addresses_and_an_unpowered_camera_do_not_answer() -> None:
         assert bus.say(OutgoingKind.I2C_START, address_byte) == (False,)
     assert bus.say(OutgoingKind.I2C_WRITE, 1) == (False,)
     bus.say(OutgoingKind.I2C_STOP)
-    other_pins = (SDA + 1) << 8 | 1
-    assert bus.say(OutgoingKind.I2C_START, CAMERA << 1, unit=other_pins) is None
     assert bus.say(OutgoingKind.PIN, 1) is None
     bus.camera.power(False, 0)
     assert bus.say(OutgoingKind.I2C_START, CAMERA << 1) == (False,)
     assert bus.say(OutgoingKind.I2C_START, CAMERA << 1 | 1) == (False,)
     assert bus.say(OutgoingKind.I2C_READ) == (True, 0xFF)  # the pulled-up line
+
+
+def test_master_on_pins_without_a_slave_is_not_acknowledged() -> None:
+    bus = Bus()
+    for unit in ((SDA + 1) << 8, 1):
+        assert bus.say(OutgoingKind.I2C_START, CAMERA << 1, unit=unit) == (False, 0xFF)
+        assert bus.say(OutgoingKind.I2C_WRITE, 1, unit=unit) == (False, 0xFF)
+        assert bus.say(OutgoingKind.I2C_READ, unit=unit) == (False, 0xFF)
+        assert bus.say(OutgoingKind.I2C_STOP, unit=unit) is None
+    assert bus.say(OutgoingKind.PIN, 1, unit=1) is None
 
 
 class Line:

@@ -110,6 +110,7 @@ bool System::fault(Fault kind, uint32_t address) {
     case Fault::LoadBus:
         bfar = address;
         cfsr |= PRECISERR | BFARVALID;
+        // The handler of a fault probes memory: the access is ignored (B3.2.8).
         if ((ccr & CCR_BFHFNMIGN) && execution_priority() < 0) return false;
         break;
     case Fault::DataViolation:

@@ -21,8 +21,8 @@
     do { \
         const Result result = load((address), (bytes), (value), (privilege)); \
         if (UNLIKELY(result != Result::Done)) { \
-            abandon(op, result, false); \
-            goto failed; \
+            if (abandon(op, result, false)) goto failed; \
+            (value) = 0;    /* an ignored bus fault: the value is UNKNOWN */ \
         } \
     } while (0)
 #define STORE_OR_FAIL(address, bytes, value, privilege) \
@@ -223,13 +223,9 @@ HANDLE(LDRD) {
     WAIT_FOR_BUS();
     r[15] = PC, cycles = now + 1;
     uint32_t low, high;
-    Result result = load(address, 4, low, privileged());
+    LOAD_OR_FAIL(address, 4, low, privileged());
     cycles++;
-    if (LIKELY(result == Result::Done)) result = load(address + 4, 4, high, privileged());
-    if (UNLIKELY(result != Result::Done)) {
-        abandon(op, result, false);
-        goto failed;
-    }
+    LOAD_OR_FAIL(address + 4, 4, high, privileged());
     now = cycles + 1;
     if (op->m) BASE_IS(start + op->value);
     r[op->d] = low, r[op->a] = high;

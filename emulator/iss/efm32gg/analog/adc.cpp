@@ -189,7 +189,7 @@ private:
         warm_reference = field(control, SINGLECTRL_REF);
         warm = true;
         converting = true;
-        part.schedule(converted, part.now() + rate.span(length));
+        part.schedule_after(converted, rate.span(length));
     }
 
     void start_scan() {

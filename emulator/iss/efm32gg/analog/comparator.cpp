@@ -75,7 +75,7 @@ private:
     void warm_up() {
         const int64_t cycles = (int64_t)4 << field(reg(CTRL), acmp::CTRL_WARMTIME);
         if (clock_now().runs())
-            part.schedule(warmed, part.now() + clock_now().span(cycles));
+            part.schedule_after(warmed, clock_now().span(cycles));
     }
 
     void on_warmed(int64_t) {

@@ -16,13 +16,13 @@ static constexpr uint32_t READY_FLAGS[] = {IF_HFRCORDY, IF_HFXORDY, IF_AUXHFRCOR
 static constexpr uint32_t SELECTED[] = {STATUS_HFRCOSEL, STATUS_HFXOSEL, 0, STATUS_LFRCOSEL,
                                         STATUS_LFXOSEL};
 static constexpr uint32_t SYNC_OFFSETS[] = {LFACLKEN0, LFAPRESC0, LFBCLKEN0, LFBPRESC0};
-static constexpr int64_t SYNC_EDGES = 3;
 static constexpr uint32_t UNLOCK = 0x580E;
 
 Cmu::Cmu(Part &part, const Instance &instance)
     : Peripheral(part, instance),
-      synchronised{{this, [](void *self, int64_t) { static_cast<Cmu *>(self)->on_synchronised(0); }},
-                   {this, [](void *self, int64_t) { static_cast<Cmu *>(self)->on_synchronised(1); }}},
+      synchronised{
+          {part, {this, [](void *self, int64_t) { static_cast<Cmu *>(self)->on_synchronised(0); }}},
+          {part, {this, [](void *self, int64_t) { static_cast<Cmu *>(self)->on_synchronised(1); }}}},
       calibrated(Event::of<&Cmu::on_calibrated>(this)) {
     for (int n = 0; n < OSCILLATORS; n++) {
         oscillators[n] = {this, n, false, false,
@@ -39,8 +39,8 @@ void Cmu::reset() {
         part.cancel(one.started);
         one.enabled = one.ready = one.number == HFRCO;
     }
-    for (Event &one : synchronised)
-        part.cancel(one);
+    for (Synchronizer &one : synchronised)
+        one.clear();
     part.cancel(calibrated);
     selected = HFRCO;
     wanted = -1;
@@ -143,7 +143,7 @@ void Cmu::switch_on(int number) {
     if (number == LFRCO)
         time = LFRCO_START;
     oscillators[number].enabled = true;
-    part.schedule(oscillators[number].started, part.now() + time);
+    part.schedule_after(oscillators[number].started, time);
 }
 
 void Cmu::on_started(int number) {
@@ -191,20 +191,20 @@ void Cmu::wake() {
 // -- synchronisation, calibration --
 
 void Cmu::synchronise() {
-    if (reg(FREEZE) & FREEZE_REGFREEZE) return;
     for (int domain = 0; domain < 2; domain++) {
-        const Rate &clock = part.rate(domain ? Clock::LFB : Clock::LFA);
-        if (!(unsynchronised >> 2 * domain & 3) || !clock.runs()) {
-            part.cancel(synchronised[domain]);
-            continue;
+        Synchronizer &one = synchronised[domain];
+        if (reg(FREEZE) & FREEZE_REGFREEZE) {
+            one.clear();
+        } else if (unsynchronised >> 2 * domain & 3) {
+            const Rate &clock = part.rate(domain ? Clock::LFB : Clock::LFA);
+            one.follow(clock);
+            one.start(clock);
         }
-        if (!synchronised[domain].pending())
-            part.schedule(synchronised[domain],
-                          clock.time(clock.edges(part.now()) + SYNC_EDGES));
     }
 }
 
 void Cmu::on_synchronised(int domain) {
+    synchronised[domain].clear();
     part.change_clocks([&] {
         for (int n = 2 * domain; n < 2 * domain + 2; n++)
             if (unsynchronised >> n & 1)
@@ -213,11 +213,7 @@ void Cmu::on_synchronised(int domain) {
     });
 }
 
-void Cmu::clocks_changed() {
-    for (Event &one : synchronised)
-        part.cancel(one);
-    synchronise();
-}
+void Cmu::clocks_changed() { synchronise(); }
 
 // Counts the periods of one clock during CALCNT + 1 periods of the other (11.3.3).
 void Cmu::start_calibration() {
@@ -233,7 +229,7 @@ void Cmu::start_calibration() {
     calibration_up = part.rate(UP[up]);
     const Rate &clock = part.rate(DOWN[down]);
     if (clock.runs())
-        part.schedule(calibrated, part.now() + clock.span((int64_t)calibration_top + 1));
+        part.schedule_after(calibrated, clock.span((int64_t)calibration_top + 1));
 }
 
 void Cmu::on_calibrated(int64_t time) {

@@ -2,7 +2,7 @@
 // 11.
 #pragma once
 
-#include "efm32gg/part/part.h"
+#include "efm32gg/part/synchronizer.h"
 
 namespace efm32gg {
 
@@ -46,7 +46,7 @@ private:
     int sleeping = 0;
     uint32_t effective[SYNCED] = {};   // LFACLKEN0 LFAPRESC0 LFBCLKEN0 LFBPRESC0 in effect
     uint32_t unsynchronised = 0;       // a bit for each of them that waits for synchronisation
-    Event synchronised[2];             // LFA, LFB
+    Synchronizer synchronised[2];      // LFA, LFB
     Event calibrated;
     uint32_t calibration_top = 0;
     Rate calibration_up;

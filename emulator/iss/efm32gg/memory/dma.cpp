@@ -148,7 +148,7 @@ int64_t Dma::delay(int64_t cycles) const {
 
 void Dma::consider() {
     if (serve.pending() || !part.enabled(instance) || next() < 0) return;
-    part.schedule(serve, part.now() + delay(ROUND));
+    part.schedule_after(serve, delay(ROUND));
 }
 
 // Ends the previous round and begins the next.
@@ -167,7 +167,7 @@ void Dma::on_serve(int64_t time) {
         raise(IF_ERR);
     }
     if (done || next() >= 0)
-        part.schedule(serve, time + delay(cycles));
+        part.schedule(serve, later(time, delay(cycles)));
 }
 
 // -- one arbitration --

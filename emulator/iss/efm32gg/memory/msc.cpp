@@ -1,9 +1,11 @@
 #include "efm32gg/memory/msc.h"
 
 #include "armv7m/core/cpu.h"
+#include "efm32gg/memory/dma.h"
 
 #include <algorithm>
 #include <cstring>
+#include <utility>
 
 namespace efm32gg {
 
@@ -12,6 +14,10 @@ using namespace msc;
 // Data sheet, 3.8: typical times.
 static constexpr int64_t PROGRAM_TIME = 20 * MICROSECOND, ERASE_TIME = 20 * MILLISECOND,
                          MASS_ERASE_TIME = 20 * MILLISECOND;
+// The longest pause between two words of a sequence (7.5.8, WORDTIMEOUT); here it begins when the
+// first one is written.
+static constexpr int64_t WORD_TIMEOUT = 30 * MICROSECOND;
+static constexpr int DMA_SOURCE = 48, DMA_DATA = 0;  // MSCWDATA
 static constexpr uint32_t MSC_UNLOCK = 0x1B71, MASS_UNLOCK = 0x631A;
 // The fastest core clock for 0 and 1 wait states (7.3.3).
 static constexpr int64_t FASTEST[] = {16000000, 32000000};
@@ -27,8 +33,10 @@ Msc::Msc(Part &part, const Instance &instance)
 void Msc::reset() {
     Peripheral::reset();
     part.cancel(done);
-    data_loaded = sequence = triggered = erasing = false;
-    address = 0;
+    part.cancel(word_timeout);
+    sequence = triggered = erasing = false;
+    address = loaded = written = 0;
+    set_data_ready(true);
     hits = misses = 0;
     invalidate_cache();
     set_readable(true);
@@ -87,9 +95,9 @@ uint32_t Msc::fetch(uint32_t at, bool sequential) {
 }
 
 int64_t Msc::read_wait(uint32_t at) {
-    if (done.pending() && !(reg(WRITECTRL) & WRITECTRL_RWWEN &&
+    if (busy() && !(reg(WRITECTRL) & WRITECTRL_RWWEN &&
                             (at ^ address) & part.memories.flash_size / 2))
-        part.stall(done.time);
+        part.stall(done.pending() ? done.time : word_timeout.time);
     return wait_states;
 }
 
@@ -121,12 +129,12 @@ void Msc::write(uint32_t offset, uint32_t value) {
             break;
         }
         reg(WDATA) = value;
-        data_loaded = true;
-        reg(STATUS) &= ~(STATUS_WDATAREADY | STATUS_WORDTIMEOUT);
-        if (sequence) {
-            triggered = true;
-            program();
-        }
+        loaded = std::min(loaded + 1, words());
+        data[loaded - 1] = value;
+        if (loaded < words()) break;
+        set_data_ready(false);
+        triggered |= sequence;
+        program();
         break;
     case WRITECMD: command(value); break;
     case CMD:
@@ -156,11 +164,14 @@ void Msc::write(uint32_t offset, uint32_t value) {
 
 void Msc::command(uint32_t value) {
     if (value & WRITECMD_CLEARWDATA) {
-        data_loaded = false;
-        reg(STATUS) |= STATUS_WDATAREADY;
+        loaded = 0;
+        set_data_ready(true);
     }
-    if (value & WRITECMD_WRITEEND)
+    if (value & WRITECMD_WRITEEND) {
         sequence = false;
+        if (word_timeout.pending())
+            release();
+    }
     if (value & WRITECMD_ERASEABORT && erasing && done.pending()) {
         part.cancel(done);
         reg(STATUS) |= STATUS_ERASEABORTED;
@@ -173,7 +184,7 @@ void Msc::command(uint32_t value) {
     }
     if (value & WRITECMD_LADDRIM)
         load_address();
-    if (value & (WRITECMD_ERASEPAGE | WRITECMD_ERASEMAIN0 | WRITECMD_ERASEMAIN1) && done.pending()) {
+    if (value & (WRITECMD_ERASEPAGE | WRITECMD_ERASEMAIN0 | WRITECMD_ERASEMAIN1) && busy()) {
         part.log_once("MSC: an erasure while the flash is busy is lost");
     } else if (value & WRITECMD_ERASEPAGE) {
         const uint32_t start = address & ~(Part::PAGE_BYTES - 1);
@@ -183,6 +194,8 @@ void Msc::command(uint32_t value) {
         const uint32_t half = part.memories.flash_size / 2;
         erase(value & WRITECMD_ERASEMAIN0 ? 0 : half, half, MASS_ERASE_TIME);
     }
+    if (value & (WRITECMD_WRITEONCE | WRITECMD_WRITETRIG | WRITECMD_ERASEPAGE))
+        reg(STATUS) &= ~STATUS_WORDTIMEOUT;
     if (value & (WRITECMD_WRITEONCE | WRITECMD_WRITETRIG)) {
         sequence = value & WRITECMD_WRITETRIG;
         triggered = true;
@@ -215,22 +228,30 @@ void Msc::load_address() {
         reg(STATUS) |= STATUS_LOCKED;
 }
 
+// Writes the loaded words, with WDOUBLE both in the time of one (7.3.6). A sequence waits for the
+// second one; WRITEONCE writes a single one, too, and leaves the other unchanged.
 void Msc::program() {
-    if (done.pending() || !triggered || !data_loaded) return;
-    uint8_t *cell = page(address);
-    triggered = data_loaded = false;
-    reg(STATUS) |= STATUS_WDATAREADY;
-    if (!cell || reg(STATUS) & (STATUS_INVADDR | STATUS_LOCKED)) return;
-    uint32_t old;
-    std::memcpy(&old, cell, 4);
-    const uint32_t now = old & reg(WDATA);
-    if (reg(WDATA) & ~old)
-        part.log_once("flash at 0x%X is written without erasure: bits stay 0", (unsigned)address);
-    std::memcpy(cell, &now, 4);
-    part.cpu.invalidate(address, 4);
-    part.send(Kind::FLASH, 0, address, 4, false);
+    if (done.pending() || !triggered || !loaded || (sequence && loaded < words())) return;
+    written = std::exchange(loaded, 0);
+    triggered = false;
+    set_data_ready(true);
+    if (reg(STATUS) & (STATUS_INVADDR | STATUS_LOCKED) || !page(address) ||
+        !page(address + 4 * (written - 1)))
+        return;
+    for (uint32_t n = 0; n < written; n++) {
+        const uint32_t at = address + 4 * n;
+        uint8_t *cell = page(at);
+        uint32_t old;
+        std::memcpy(&old, cell, 4);
+        const uint32_t now = old & data[n];
+        if (data[n] & ~old)
+            part.log_once("flash at 0x%X is written without erasure: bits stay 0", (unsigned)at);
+        std::memcpy(cell, &now, 4);
+        part.cpu.invalidate(at, 4);
+        part.send(Kind::FLASH, 0, at, 4, false);
+    }
     erasing = false;
-    busy(PROGRAM_TIME);
+    occupy(PROGRAM_TIME);
 }
 
 void Msc::erase(uint32_t at, uint32_t size, int64_t time) {
@@ -242,13 +263,25 @@ void Msc::erase(uint32_t at, uint32_t size, int64_t time) {
     part.send(Kind::FLASH, 1, at, size == Part::PAGE_BYTES && at < part.memories.flash_size
                                       ? wear[at / Part::PAGE_BYTES] : size, false);
     erasing = true;
-    busy(time);
+    occupy(time);
 }
 
-void Msc::busy(int64_t time) {
+void Msc::occupy(int64_t time) {
+    part.cancel(word_timeout);
     reg(STATUS) |= STATUS_BUSY;
     set_readable(false);
-    part.schedule(done, part.now() + time);
+    part.schedule_after(done, time);
+}
+
+void Msc::release() {
+    part.cancel(word_timeout);
+    reg(STATUS) &= ~STATUS_BUSY;
+    set_readable(true);
+}
+
+void Msc::set_data_ready(bool ready) {
+    set_bits(reg(STATUS), STATUS_WDATAREADY, ready);
+    part.dma->request(DMA_SOURCE, DMA_DATA, ready);
 }
 
 // Flash that is being written does not answer: the core's accesses then go through read_wait.
@@ -262,13 +295,23 @@ void Msc::set_readable(bool readable) {
 }
 
 void Msc::on_done(int64_t) {
-    reg(STATUS) &= ~STATUS_BUSY;
-    set_readable(true);
     if (!erasing)
-        address += 4;
+        address += 4 * written;
     raise(erasing ? IF_ERASE : IF_WRITE);
+    if (sequence && !erasing)
+        part.schedule_after(word_timeout, WORD_TIMEOUT);
+    else
+        release();
     erasing = false;
+    triggered |= sequence && loaded == words();
     program();
+}
+
+// The flash is free again; data that comes later waits for another command.
+void Msc::on_word_timeout(int64_t) {
+    sequence = triggered = false;
+    reg(STATUS) |= STATUS_WORDTIMEOUT;
+    release();
 }
 
 }  // namespace efm32gg

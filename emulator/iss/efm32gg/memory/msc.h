@@ -37,11 +37,16 @@ private:
     std::vector<uint32_t> wear;      // erasures by page since the part was created
 
     uint32_t address = 0;            // of the next write
-    bool data_loaded = false;        // WDATA has a word
-    bool sequence = false;           // WRITETRIG: each word is written when loaded
-    bool triggered = false;          // the loaded word is written as soon as the array is free
+    uint32_t data[2] = {};           // loaded by WDATA; two with WDOUBLE
+    uint32_t loaded = 0, written = 0;
+    bool sequence = false;           // WRITETRIG: data is written as soon as it is loaded
+    bool triggered = false;          // the loaded data is written as soon as the array is free
     bool erasing = false;
     Event done = Event::of<&Msc::on_done>(this);
+    Event word_timeout = Event::of<&Msc::on_word_timeout>(this);
+
+    uint32_t words() const { return reg(msc::WRITECTRL) & msc::WRITECTRL_WDOUBLE ? 2 : 1; }
+    bool busy() const { return reg(msc::STATUS) & msc::STATUS_BUSY; }
 
     bool counting() const { return reg(msc::STATUS) & msc::STATUS_PCRUNNING; }
     void invalidate_cache();
@@ -52,8 +57,11 @@ private:
     uint8_t *page(uint32_t at);
     void program();
     void erase(uint32_t at, uint32_t size, int64_t time);
-    void busy(int64_t time);
+    void occupy(int64_t time);
+    void release();
+    void set_data_ready(bool ready);
     void on_done(int64_t time);
+    void on_word_timeout(int64_t time);
     void set_readable(bool readable);
 };
 

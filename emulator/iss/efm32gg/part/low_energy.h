@@ -2,7 +2,7 @@
 // EFM32GG Reference Manual, 5.3.1.
 #pragma once
 
-#include "efm32gg/part/part.h"
+#include "efm32gg/part/synchronizer.h"
 
 #include <algorithm>
 #include <utility>
@@ -15,7 +15,7 @@ public:
 
     void reset() override {
         Peripheral::reset();
-        part.cancel(synchronized);
+        synchronizing.clear();
         count = 0;
     }
 
@@ -24,8 +24,10 @@ public:
         if (!written || !written->busy) {
             const bool was_frozen = frozen();
             Peripheral::write(offset, value);
-            if ((int32_t)offset == layout.freeze && was_frozen && !(value & 1))
-                start();
+            if (frozen())
+                synchronizing.clear();
+            else if (was_frozen && count)
+                synchronizing.start(synchronizer());
             return;
         }
         reg((uint32_t)layout.syncbusy) |= written->busy;
@@ -43,13 +45,11 @@ public:
         *place = {offset, merges ? merge_commands(place->value, value) : value, at_once};
         if (at_once)
             apply(offset, value);
-        start();
+        if (!frozen())
+            synchronizing.start(synchronizer());
     }
 
-    void clocks_changed() override {
-        part.cancel(synchronized);
-        start();
-    }
+    void clocks_changed() override { synchronizing.follow(synchronizer()); }
 
 protected:
     // A write takes effect.
@@ -71,18 +71,12 @@ private:
 
     Write waiting[MOST];
     int count = 0;
-    Event synchronized = Event::of<&LowEnergy::on_synchronized>(this);
+    Synchronizer synchronizing{part, Event::of<&LowEnergy::on_synchronized>(this)};
 
     bool frozen() const { return reg((uint32_t)layout.freeze) & 1; }
 
-    // A write takes two to three clocks.
-    void start() {
-        const Rate rate = synchronizer();
-        if (count && !synchronized.pending() && !frozen() && rate.runs())
-            part.schedule(synchronized, rate.time(rate.edges(part.now()) + 3));
-    }
-
     void on_synchronized(int64_t) {
+        synchronizing.clear();
         Write done[MOST];
         const int number = std::exchange(count, 0);
         std::copy(waiting, waiting + number, done);
@@ -95,6 +89,12 @@ private:
 
 // A counter of a low-energy unit, computed from the time when it is accessed. An event is scheduled
 // only for ticks that have an effect beyond the counter.
+//
+// The rule of all counters: a compare flag is set by the clock edge that ends the period in which
+// the counter equals the compare value, so with that value as top the counter reads 0 (LETIMER: the
+// next lower value) when the flag comes, and an equal value at the start matches. The manual says
+// "when equal" and does not show the edge; software of the vendor and of two RTOS depends on it, and
+// TIMER of a later part of the same family was measured to behave so.
 class LowEnergyCounter : public LowEnergy {
 public:
     LowEnergyCounter(Part &part, const Instance &instance, uint32_t count_register)

@@ -99,11 +99,13 @@ public:
     // -- time --
     int64_t now() const;
     void schedule(Event &event, int64_t time);  // lowers the core's deadline if needed
+    void schedule_after(Event &event, int64_t span) { schedule(event, later(now(), span)); }
     void cancel(Event &event) { events.remove(event); }
     int64_t next_event() const;
 
     // Runs up to `until`, or until the core falls asleep, wakes or stops, or a message in the
-    // outbox requests a stop; `exits` has the reasons.
+    // outbox requests a stop; `exits` has the reasons. After a bounded amount of work it returns
+    // earlier, as at `until`.
     int64_t run(int64_t until);
     uint32_t exits = 0;
 
@@ -216,7 +218,7 @@ private:
     void clocks_set();
     void rebase(int64_t time);
     void advance(int64_t time);
-    void perform_due();
+    void perform_due(int64_t &steps);
     int64_t cycle_at(int64_t time) const;
     void fall_asleep();
     void wake(int64_t before);

@@ -68,16 +68,31 @@ void Part::advance(int64_t time) {
     }
 }
 
-void Part::perform_due() {
-    while (!wanted_reset && events.next_time() <= now())
+void Part::perform_due(int64_t &steps) {
+    while (!wanted_reset && events.next_time() <= now() && steps > 0) {
         events.perform();
+        steps--;
+    }
 }
+
+// Bounds of the work of one run, a few hundredths of a second of wall time: the caller may then
+// handle an interrupt, and continues.
+static constexpr int64_t MOST_INSTRUCTIONS = 1 << 20, MOST_STEPS = 1 << 16;
 
 int64_t Part::run(int64_t until) {
     exits = 0;
     stop_wanted = false;
+    const uint64_t last_instruction = cpu.instructions + MOST_INSTRUCTIONS;
+    const int64_t began = now();
+    int64_t steps = MOST_STEPS;
     for (;;) {
-        perform_due();
+        perform_due(steps);
+        if (steps-- <= 0 || cpu.instructions >= last_instruction) {
+            if (now() == began)
+                log_once("events of the peripherals follow each other without time passing");
+            exits |= armv7m::ExitDeadline;
+            break;
+        }
         if (wanted_reset) {
             perform_reset();
             exits |= ExitOutbox;
@@ -94,11 +109,12 @@ int64_t Part::run(int64_t until) {
         } else if (asleep) {
             if (wait_for_wake(next)) break;
         } else if (standing) {
+            if (std::min(next, standing_until) == NEVER) break;
             advance(std::min(next, standing_until));
         } else if (stalled_until > now()) {
             advance(std::min(next, stalled_until));
         } else {
-            cpu.set_deadline(cycle_at(next));
+            cpu.set_deadline(std::min(cycle_at(next), cpu.cycles + MOST_INSTRUCTIONS));
             const uint32_t ended = cpu.run();
             if (ended & armv7m::ExitLockup && std::exchange(locked, true) && next != NEVER) {
                 advance(next);

@@ -7,7 +7,15 @@ namespace efm32gg {
 
 constexpr int64_t SECOND = 1000000000000, MILLISECOND = SECOND / 1000,
                   MICROSECOND = MILLISECOND / 1000, NANOSECOND = 1000;
+// Later than any time that can be represented (about 106 days): never.
 constexpr int64_t NEVER = INT64_MAX;
+
+// The one conversion to picoseconds: what does not fit is never.
+constexpr int64_t picoseconds(__int128 exact) {
+    return exact >= NEVER ? NEVER : (int64_t)exact;
+}
+// `span` after `time`.
+constexpr int64_t later(int64_t time, int64_t span) { return picoseconds((__int128)time + span); }
 
 // An even clock: edge k is at origin + floor(k * numerator / denominator) picoseconds.
 class Rate {
@@ -33,8 +41,8 @@ public:
     int64_t time(int64_t k) const {
         if (!hertz) return NEVER;
         if (k >= 0 && k < short_reach)
-            return origin + k * (int64_t)numerator / denominator;
-        return origin + (int64_t)((__int128)numerator * k / denominator);
+            return later(origin, k * (int64_t)numerator / denominator);
+        return picoseconds(origin + numerator * k / denominator);
     }
 
     // Number of edges after the origin, up to and including `time`.
@@ -51,7 +59,7 @@ public:
 
     // Picoseconds of n periods, rounded down; NEVER if the clock is stopped.
     int64_t span(int64_t n) const {
-        return hertz ? (int64_t)((__int128)numerator * n / denominator) : NEVER;
+        return hertz ? picoseconds(numerator * n / denominator) : NEVER;
     }
 
     // The clock after a divider that starts at `start`.

@@ -153,7 +153,7 @@ void I2c::watch_low() {
     const int cycles = LOW_CYCLES[field(reg(CTRL), CTRL_CLTO)];
     const Rate rate = clock_now();
     if (cycles && rate.runs())
-        part.schedule(low_timeout, part.now() + rate.span(cycles * ((int64_t)reg(CLKDIV) + 1)));
+        part.schedule_after(low_timeout, rate.span(cycles * ((int64_t)reg(CLKDIV) + 1)));
 }
 
 void I2c::on_low_timeout(int64_t) { raise(IF_CLTO); }
@@ -165,7 +165,7 @@ void I2c::watch_idle() {
     const Rate rate = clock_now();
     if (cycles && busy && master == Master::IDLE && slave == Slave::IDLE &&
         reg(CTRL) & CTRL_EN && rate.runs())
-        part.schedule(idle_timeout, part.now() + rate.span(cycles * ((int64_t)reg(CLKDIV) + 1)));
+        part.schedule_after(idle_timeout, rate.span(cycles * ((int64_t)reg(CLKDIV) + 1)));
 }
 
 void I2c::on_idle_timeout(int64_t) {

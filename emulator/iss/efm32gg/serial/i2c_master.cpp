@@ -8,7 +8,7 @@ using namespace i2c;
 void I2c::after(int64_t bit_count, Master next) {
     master = next;
     hold(false);
-    part.schedule(bits, part.now() + bit(bit_count));
+    part.schedule_after(bits, bit(bit_count));
 }
 
 // Continues from a held bus as far as commands and data allow (16.3.5).

@@ -46,9 +46,9 @@ public:
             start = clock.time(clock.edge_at_or_after(now));
             passed = 0;
         }
-        begin = start + rate.span(passed) / per_clock;
+        begin = later(start, rate.span(passed) / per_clock);
         passed += units;
-        end = start + rate.span(passed) / per_clock;
+        end = later(start, rate.span(passed) / per_clock);
     }
 
 private:

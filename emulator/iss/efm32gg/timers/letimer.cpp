@@ -45,24 +45,26 @@ void LeTimer::pass(int64_t passed) {
                 outputs[n] = outputs[n] && !pulsing[n], pulsing[n] = false;
         int64_t next = std::min(passed, (int64_t)value + 1);
         for (const uint32_t compare : {reg(COMP0), reg(COMP1)})
-            if (compare < value)
-                next = std::min(next, (int64_t)value - compare);
+            if (compare <= value)
+                next = std::min(next, (int64_t)value - compare + 1);
+        if (outputs_matter() && reg(COMP1) < value)
+            next = std::min(next, (int64_t)value - reg(COMP1));
         if (outputs_matter())
             next = std::min<int64_t>(next, action(0) == PULSE || action(1) == PULSE ? 1 : next);
         const bool under = next == (int64_t)value + 1;
-        value = under ? top() : (uint32_t)(value - next);
+        // The counter leaves this value.
+        const uint32_t left = (uint32_t)(value - next + 1);
+        uint32_t flags = (under ? IF_UF : 0) | (left == reg(COMP0) ? IF_COMP0 : 0) |
+                         (left == reg(COMP1) ? IF_COMP1 : 0);
+        value = under ? top() : left - 1;
         passed -= next;
         if (under)
             underflow();
-        uint32_t flags = under ? IF_UF : 0;
-        if (value == reg(COMP0))
-            flags |= IF_COMP0;
-        if (value == reg(COMP1)) {
-            flags |= IF_COMP1;
+        // The output has its level as soon as the counter has the value.
+        if (value == reg(COMP1))
             for (int n = 0; n < 2; n++)
                 if (action(n) == PWM && reg(n ? REP1 : REP0))
                     outputs[n] = true;
-        }
         if (flags)
             raise(flags);
         show_outputs();
@@ -120,6 +122,12 @@ int64_t LeTimer::until(uint32_t wanted) const {
     return wanted <= top() ? (int64_t)value + 1 + top() - wanted : FAR;
 }
 
+int64_t LeTimer::until_left(uint32_t wanted) const {
+    if (wanted == value) return 1;
+    const int64_t reached = until(wanted);
+    return reached == FAR ? FAR : reached + 1;
+}
+
 bool LeTimer::outputs_matter() const {
     for (int n = 0; n < 2; n++)
         if (action(n) && (pin(n) >= 0 || part.prs->listens(REFLEX, n))) return true;
@@ -133,8 +141,10 @@ int64_t LeTimer::next_effect() const {
     if (repeat_mode() != FREE || awaited & (IF_UF | IF_REP0 | IF_REP1) || outputs_matter())
         next = (int64_t)value + 1;
     if (awaited & IF_COMP0)
-        next = std::min(next, until(reg(COMP0)));
-    if (awaited & IF_COMP1 || outputs_matter())
+        next = std::min(next, until_left(reg(COMP0)));
+    if (awaited & IF_COMP1)
+        next = std::min(next, until_left(reg(COMP1)));
+    if (outputs_matter())
         next = std::min(next, until(reg(COMP1)));
     return next;
 }

@@ -31,7 +31,9 @@ private:
     uint32_t action(int output) const;
     void underflow();
     void count_down(int which);
+    // Ticks until the counter reaches and leaves `wanted`; FAR if it does not.
     int64_t until(uint32_t wanted) const;
+    int64_t until_left(uint32_t wanted) const;
     bool outputs_matter() const;
     void start();
     void stop();

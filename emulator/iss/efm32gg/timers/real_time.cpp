@@ -100,12 +100,13 @@ private:
         return (int64_t)(value <= top() ? top() : shape.last) - value + 1;
     }
 
-    // Ticks until the counter reaches `wanted`, 1 or more; FAR if it never will.
+    // Ticks until the end of the next period in which the counter equals `wanted`; FAR if it never
+    // will.
     int64_t until(uint32_t wanted) const {
         const int64_t zero = until_zero();
-        if (wanted > value && (int64_t)wanted - value < zero)
-            return (int64_t)wanted - value;
-        return wanted <= top() ? zero + wanted : FAR;
+        if (wanted >= value && (int64_t)wanted - value < zero)
+            return (int64_t)wanted - value + 1;
+        return wanted <= top() ? zero + wanted + 1 : FAR;
     }
 };
 
@@ -194,13 +195,19 @@ public:
 
 private:
     static constexpr uint32_t RETAINED = 128;
+    enum Oscillator : uint32_t { NO_CLOCK, LFRCO, LFXO, ULFRCO };  // of CTRL_CLKSEL
 
     int64_t oscillator_hertz = 0;  // of the oscillator that it keeps running
     int64_t oscillator_origin = 0;
 
+    // ULFRCO is not divided: it gives 2 kHz with PRESC = DIV1 and 1 kHz with all other values
+    // (emlib's BURTC_Init and BURTC_ClockFreqGet).
     Rate clock() const override {
         if (!oscillator_hertz || !counts()) return Rate();
-        return {oscillator_hertz, (int64_t)1 << field(reg(CTRL), CTRL_PRESC), oscillator_origin};
+        const uint32_t divider = field(reg(CTRL), CTRL_PRESC);
+        if (field(reg(CTRL), CTRL_CLKSEL) == ULFRCO)
+            return {oscillator_hertz * (divider ? 1 : 2), 1, oscillator_origin};
+        return {oscillator_hertz, (int64_t)1 << divider, oscillator_origin};
     }
 
     // Its own clock; without one, only the bus delays a write.
@@ -222,8 +229,9 @@ private:
     // The selected oscillator keeps running through resets, if it was running when selected.
     void take_oscillator() {
         const uint32_t chosen = field(reg(CTRL), CTRL_CLKSEL);
-        const Clock source = chosen == 1 ? Clock::LFRCO : chosen == 2 ? Clock::LFXO : Clock::ULFRCO;
-        if (!chosen) {
+        const Clock source = chosen == LFRCO ? Clock::LFRCO
+                             : chosen == LFXO ? Clock::LFXO : Clock::ULFRCO;
+        if (chosen == NO_CLOCK) {
             oscillator_hertz = 0;
         } else if (part.rate(source).runs()) {
             oscillator_hertz = part.hertz(source);

@@ -39,6 +39,20 @@ int64_t Timer::until_value(const Count &from, uint32_t value) const {
     return distance > 0 && distance < until_wrap(from) ? distance : FAR;
 }
 
+// Ticks until channel n matches: the edge at which the counter leaves the compare value, the wrap
+// at the latest; FAR if it does not (the rule is in low_energy.h).
+int64_t Timer::until_match(const Count &from, int n) const {
+    const uint32_t value = reg(cc(n, CC0_CCV));
+    if (from.value == value) return 1;
+    const int64_t reached = until_value(from, value);
+    return reached == FAR ? FAR : reached + 1;
+}
+
+// Ticks until the pin of a PWM channel changes: it follows the counter's value.
+int64_t Timer::until_level(const Count &from, int n) const {
+    return cc_mode(n) == PWM && pin(n) >= 0 ? until_value(from, reg(cc(n, CC0_CCV))) : FAR;
+}
+
 // `steps` may reach the next wrap, but not pass it.
 Timer::Count Timer::after(Count from, int64_t steps) const {
     const bool down = counts_down(from);
@@ -92,16 +106,17 @@ void Timer::pass(int64_t steps) {
         int64_t next = std::min(steps, until_wrap(count));
         for (int n = 0; n < CHANNELS; n++)
             if (compares(n))
-                next = std::min(next, until_value(count, reg(cc(n, CC0_CCV))));
+                next = std::min({next, until_match(count, n), until_level(count, n)});
         const bool wraps = next == until_wrap(count);
-        const Count before = count;
+        bool matches[CHANNELS];
+        for (int n = 0; n < CHANNELS; n++)
+            matches[n] = compares(n) && until_match(count, n) == next;
         count = after(count, next);
         steps -= next;
         if (wraps)
             wrapped();
         for (int n = 0; n < CHANNELS; n++)
-            if (compares(n) && count.value == reg(cc(n, CC0_CCV)) &&
-                (wraps || count.value != before.value))
+            if (matches[n])
                 matched(n);
         show_outputs();
     }
@@ -176,8 +191,7 @@ void Timer::plan() {
     int64_t next = watched_wrap() ? wrap : FAR;
     for (int n = 0; n < CHANNELS; n++)
         if (watched(n)) {
-            const uint32_t value = reg(cc(n, CC0_CCV));
-            const int64_t distance = until_value(count, value);
+            const int64_t distance = std::min(until_match(count, n), until_level(count, n));
             // Beyond the next wrap: plan again there.
             next = std::min(next, distance == FAR ? wrap : distance);
         }

@@ -64,6 +64,8 @@ private:
     Timer *next_timer() const;
     int64_t until_wrap(const Count &from) const;
     int64_t until_value(const Count &from, uint32_t value) const;
+    int64_t until_match(const Count &from, int n) const;
+    int64_t until_level(const Count &from, int n) const;
     Count after(Count from, int64_t steps) const;
     Count far_after(Count from, int64_t steps) const;
     Count current() const { return far_after(count, pending_ticks()); }

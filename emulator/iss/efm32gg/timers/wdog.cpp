@@ -1,12 +1,9 @@
 // Watchdog timer. EFM32GG Reference Manual, chapter 12.
-#include "efm32gg/part/part.h"
+#include "efm32gg/part/synchronizer.h"
 
 namespace efm32gg {
 
 using namespace wdog;
-
-// Clock edges until a written register takes effect.
-static constexpr int64_t SYNC_EDGES = 3;
 
 namespace {
 
@@ -17,7 +14,7 @@ public:
     void reset() override {
         Peripheral::reset();
         part.cancel(timeout);
-        part.cancel(synchronised);
+        synchronised.clear();
         effective = reg(CTRL);
         clearing = false;
         counted = 0;
@@ -53,7 +50,7 @@ public:
 
 private:
     Event timeout = Event::of<&Wdog::on_timeout>(this);
-    Event synchronised = Event::of<&Wdog::on_synchronised>(this);
+    Synchronizer synchronised{part, Event::of<&Wdog::on_synchronised>(this)};
     uint32_t effective = 0;   // CTRL as it acts
     bool clearing = false;
     int64_t counted = 0;      // periods of the clock, up to `since`
@@ -68,9 +65,10 @@ private:
     }
 
     void synchronise() {
+        if (!reg(SYNCBUSY)) return;
         const Rate rate = source(reg(CTRL));
-        if (reg(SYNCBUSY) && !synchronised.pending() && rate.runs())
-            part.schedule(synchronised, rate.time(rate.edges(part.now()) + SYNC_EDGES));
+        synchronised.follow(rate);
+        synchronised.start(rate);
     }
 
     void restart() {
@@ -87,6 +85,7 @@ private:
 
     void on_synchronised(int64_t) {
         const bool was_on = effective & CTRL_EN;
+        synchronised.clear();
         clocks_changing();
         effective = reg(CTRL);
         if (clearing || !was_on)

@@ -236,11 +236,30 @@ def test_return_of_an_inactive_exception_is_a_usage_fault():
 
 
 def test_bfhfnmign_ignores_bus_faults_in_the_hard_fault_handler():
-    bench = Bench(f"udf #0; @3: ldr r0, ={NOWHERE}; movs r1, #5; ldr r1, [r0]; b .")
+    bench = Bench(f"udf #0; @3: ldr r0, ={NOWHERE}; movs r1, #5; ldr r1, [r0]; movs r2, #7; b .")
     bench["CCR"] = 0x300
     bench.run(100)
     assert (bench.ipsr, bench["locked"]) == (HARD_FAULT, 0)
     assert bench["CFSR"] == UNDEFINSTR | PRECISE
+    assert (bench["r2"], bench["BFAR"]) == (7, NOWHERE)  # the load did not stop the handler
+
+
+@pytest.mark.parametrize(
+    "load",
+    [
+        pytest.param("ldr r1, [r0]", id="LDR"),
+        pytest.param(".short 0xE9D0, 0x1300", id="LDRD r1, r3"),
+        pytest.param(".short 0xC80A", id="LDM r0!, {r1, r3}"),
+        pytest.param(".short 0xE850, 0x1F00", id="LDREX r1"),
+        pytest.param(".short 0xF850, 0x1E00", id="LDRT r1"),
+    ],
+)
+def test_bfhfnmign_ignores_bus_faults_of_every_load_with_faultmask(load):
+    bench = run(f"cpsid f; ldr r0, ={NOWHERE}; {load}; movs r2, #7; b .", cycles=0)
+    bench["CCR"] = 0x300
+    bench.run(100)
+    assert (bench.ipsr, bench["locked"], bench["r2"]) == (0, 0, 7)
+    assert bench["CFSR"] == PRECISE
 
 
 @pytest.mark.parametrize(("monitor", "ipsr", "hfsr"), [(0, HARD_FAULT, DEBUGEVT), (1 << 16, 12, 0)])

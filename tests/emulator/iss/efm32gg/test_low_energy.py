@@ -104,9 +104,33 @@ def test_rtc_counts_like_a_stepped_counter(
         bench.run_for(wait * S // HZ)
         for _ in range(wait):
             top = compare0 if is_top else 0xFF_FFFF
-            value = 0 if value == top else value + 1
             flags |= (2 if value == compare0 else 0) | (4 if value == compare1 else 0)
+            value = 0 if value == top else value + 1
         assert (bench["RTC.CNT"], bench["RTC.IF"]) == (value, flags)
+
+
+def test_compare_flag_comes_when_the_counter_leaves_the_compare_value() -> None:
+    bench = rtc(COMP0=9, COMP1=4, CTRL=5)
+    last: dict[int, int] = {}  # count by flags
+    for _ in range(8 * 12):
+        flags = bench["RTC.IF"]
+        last[flags] = bench["RTC.CNT"]
+        if flags & 2:
+            break
+        bench.run_for(TICK // 8)
+    assert last == {0: 4, 4: 9, 6: 0}
+
+
+@pytest.mark.parametrize("compare", [0, 1])
+def test_compare_value_equal_to_the_counter_at_the_start_matches(compare: int) -> None:
+    bench = rtc(**{"COMP0": 0xFFFF, "COMP1": 0xFFFF, f"COMP{compare}": 0})
+    bench["RTC.CTRL"] = 1
+    bench.run_for(2 * TICK)
+    assert bench["RTC.IF"] == 2 << compare
+    bench["RTC.IFC"] = 7
+    bench[f"RTC.COMP{compare}"] = bench["RTC.CNT"]
+    bench.run_for(2 * TICK)
+    assert bench["RTC.IF"] == 2 << compare
 
 
 # -- LETIMER --
@@ -283,7 +307,9 @@ def test_dma_reads_characters_in_em2_with_rxdmawu() -> None:
 
 # -- BURTC --
 
-ULFRCO = 3 << 12 | 1
+ULFRCO_2_KHZ = 3 << 12 | 1
+ULFRCO = ULFRCO_2_KHZ | 1 << 8
+LFRCO = 1 << 12 | 1
 
 
 def burtc(control: int = 0, **registers: int) -> Bench:
@@ -333,22 +359,44 @@ def test_burtc_continues_over_a_reset() -> None:
 
 
 def test_burtc_interrupts_at_its_compare_value() -> None:
-    bench = burtc(ULFRCO, COMP0=10, IEN=2)
-    bench.run_for(8 * MS)
+    bench = burtc(COMP0=10, IEN=2)
+    bench.run_for(MS)
+    bench["BURTC.CTRL"] = ULFRCO
+    bench.run_for(9 * MS)
     assert not bench.peek("BURTC.IF")
     bench.run_for(4 * MS)
     assert (bench.peek("BURTC.IF"), bench.pending()) == (2, [BURTC_IRQ])
 
 
 def test_burtc_applies_prescaler_and_lock() -> None:
-    bench = burtc(ULFRCO | 3 << 8)
-    bench.run_for(800 * MS)
-    assert abs(bench["BURTC.CNT"] - 100) <= 1
+    bench = burtc(LFRCO | 7 << 8)
+    bench.run_for(S)
+    assert abs(bench["BURTC.CNT"] - 256) <= 1
     bench.load("BURTC", LOCK=0, CTRL=0)
-    assert bench["BURTC.CTRL"] == ULFRCO | 3 << 8
+    assert bench["BURTC.CTRL"] == LFRCO | 7 << 8
     assert "BURTC is locked" in bench.log()
     bench.load("BURTC", LOCK=0xAEE8, CTRL=8)
     assert bench["BURTC.CNT"] == 0
+
+
+@pytest.mark.parametrize(("prescaler", "hz"), [(0, 2000), (1, 1000), (7, 1000)])
+def test_burtc_on_ulfrco_counts_at_2_khz_undivided_and_else_at_1_khz(
+    prescaler: int, hz: int
+) -> None:
+    bench = burtc(ULFRCO_2_KHZ | prescaler << 8)
+    bench.run_for(S // 10)
+    assert abs(bench["BURTC.CNT"] - hz // 10) <= 1
+
+
+def test_burtc_write_takes_effect_although_the_part_keeps_entering_em2() -> None:
+    bench = low(2, "RTC", interrupts=True).load("RMU", CTRL=0)
+    bench.load("RTC", COMP0=15, IEN=2, CTRL=5).load("BURTC", CTRL=ULFRCO, COMP0=1000)
+    for _ in range(10):  # wakes and sleeps again each half millisecond
+        bench["RTC.IFC"] = 7
+        bench.machine.write(NOT_PENDING, 1 << 30)
+        bench.run_for(MS // 2)
+    assert len(bench.out(OutgoingKind.SLEEP)) > 10
+    assert (bench["BURTC.SYNCBUSY"], bench["BURTC.COMP0"]) == (0, 1000)
 
 
 # -- PCNT --

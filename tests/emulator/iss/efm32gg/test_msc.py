@@ -1,5 +1,6 @@
 """Flash: programming, erasing, locks, wear, stalls; wait states and the instruction cache."""
 
+import struct
 from pathlib import Path
 
 import pytest
@@ -7,7 +8,7 @@ import pytest
 from cubestack.emulator.iss.outcome import OutgoingKind
 from tests.emulator.iss.cross_compiler import needs_compiler
 
-from .bench import MS, US, Bench, compiled, mask_of
+from .bench import MS, US, Bench, address_of, asleep, compiled, mask_of
 
 PAGE = 0x8_0000
 UNLOCK = 0x1B71
@@ -73,6 +74,100 @@ def test_sequence_of_words_fills_consecutive_addresses() -> None:
     bench.run_for(100 * US)
     bench.command("MSC.WRITECMD.WRITEEND")
     assert [bench.machine.read(PAGE + 4 * n) for n in range(4)] == [*words, 0xFFFF_FFFF]
+
+
+def start_writing(more: int = 0) -> Bench:
+    bench = Bench()
+    return bench.load(
+        "MSC", WRITECTRL=1 | more, ADDRB=PAGE, WRITECMD=mask_of("MSC.WRITECMD.LADDRIM")
+    )
+
+
+def words(bench: Bench, count: int) -> list[int | None]:
+    bench.machine.run(bench.now)
+    return [bench.machine.read(PAGE + 4 * n) for n in range(count)]
+
+
+DOUBLE = mask_of("MSC.WRITECTRL.WDOUBLE")
+ERASED = 0xFFFF_FFFF
+
+
+def test_two_words_are_written_in_the_time_of_one_with_wdouble() -> None:
+    bench = start_writing(DOUBLE)
+    for first in (0x11, 0x33):
+        bench["MSC.WDATA"] = first
+        assert bench.is_set("MSC.STATUS.WDATAREADY")
+        bench["MSC.WDATA"] = first + 1
+        assert not bench.is_set("MSC.STATUS.WDATAREADY")
+        bench.command("MSC.WRITECMD.WRITEONCE")
+        assert bench.is_set("MSC.STATUS.BUSY")
+        bench.run_for(21 * US)
+        assert not bench.is_set("MSC.STATUS.BUSY")
+    assert words(bench, 5) == [0x11, 0x12, 0x33, 0x34, ERASED]
+
+
+def test_single_word_with_wdouble_leaves_the_other_one_erased() -> None:
+    bench = start_writing(DOUBLE)
+    bench["MSC.WDATA"] = 0x11
+    bench.command("MSC.WRITECMD.WRITEONCE")
+    bench.run_for(21 * US)
+    assert words(bench, 2) == [0x11, ERASED]
+
+
+@pytest.mark.parametrize("double", [0, DOUBLE])
+@pytest.mark.parametrize("again", [False, True], ids=["one trigger", "a trigger for each write"])
+def test_sequence_writes_data_as_soon_as_it_is_loaded(double: int, again: bool) -> None:
+    bench = start_writing(double)
+    data = [0x1000 + n for n in range(8)]
+    each = 2 if double else 1
+    for index, word in enumerate(data):
+        for _ in range(40):
+            if bench.is_set("MSC.STATUS.WDATAREADY"):
+                break
+            bench.run_for(US)
+        bench["MSC.WDATA"] = word
+        if index % each == each - 1 and (again or index < each):
+            bench.command("MSC.WRITECMD.WRITETRIG")
+    began = bench.now
+    while bench.is_set("MSC.STATUS.BUSY"):
+        bench.run_for(US)
+    assert 30 * US < bench.now - began < 75 * US
+    assert bench.is_set("MSC.STATUS.WORDTIMEOUT")
+    assert words(bench, 9) == [*data, ERASED]
+
+
+def test_word_that_misses_the_time_out_of_a_sequence_needs_a_new_trigger() -> None:
+    bench = start_writing()
+    bench["MSC.WDATA"] = 1
+    bench.command("MSC.WRITECMD.WRITETRIG")
+    bench.run_for(60 * US)
+    assert not bench.is_set("MSC.STATUS.BUSY")
+    bench["MSC.WDATA"] = 2
+    bench.run_for(60 * US)
+    assert words(bench, 2) == [1, ERASED]
+    assert bench.is_set("MSC.STATUS.WORDTIMEOUT")
+    bench.command("MSC.WRITECMD.WRITETRIG")
+    assert not bench.is_set("MSC.STATUS.WORDTIMEOUT")
+    bench.run_for(21 * US)
+    bench.command("MSC.WRITECMD.WRITEEND")
+    assert not bench.is_set("MSC.STATUS.BUSY")
+    bench.run_for(60 * US)
+    assert not bench.is_set("MSC.STATUS.WORDTIMEOUT")
+    assert words(bench, 2) == [1, 2]
+
+
+def test_dma_supplies_the_words_of_a_sequence() -> None:
+    bench = asleep(1).load(
+        "MSC", WRITECTRL=1, ADDRB=PAGE, WRITECMD=mask_of("MSC.WRITECMD.LADDRIM")
+    )
+    data = [0x2000 + n for n in range(6)]
+    bench.machine.poke(0x2000_1000, struct.pack("<6I", *data))
+    bench["MSC.WDATA"] = data[0]
+    bench.command("MSC.WRITECMD.WRITETRIG")
+    basic = 3 << 30 | 2 << 28 | 2 << 26 | 2 << 24 | 4 << 4 | 1  # five words to a fixed address
+    bench.dma(0, 48 << 16, 0x2000_1000 + 20, address_of("MSC.WDATA"), basic)
+    bench.run_for(300 * US)
+    assert words(bench, 7) == [*data, ERASED]
 
 
 def test_write_needs_wren_and_unlocked_registers() -> None:

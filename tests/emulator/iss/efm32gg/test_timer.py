@@ -46,7 +46,8 @@ class Oracle:
     flags: int = 0
 
     def tick(self) -> None:
-        before = self.value
+        if self.value == self.compare:
+            self.flags |= CC0
         if self.mode == UP:
             if self.value == self.top:
                 self.value, self.flags = 0, self.flags | OF
@@ -66,8 +67,6 @@ class Oracle:
             self.value, self.down, self.flags = self.top - 1, True, self.flags | OF
         else:
             self.value += 1
-        if self.value == self.compare != before:
-            self.flags |= CC0
 
 
 @settings(max_examples=80, deadline=None)
