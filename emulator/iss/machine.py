@@ -128,7 +128,8 @@ class Machine:
         """Run up to a time, or to a message that requires a stop.
 
         After about a million instructions it returns early, with the reason TIME, so that the
-        caller can handle an interrupt; call it again. An asleep machine advances to its next event, or to ``until_ps``.
+        caller can handle an interrupt; call it again. An asleep machine advances to its next event,
+        or to ``until_ps``.
         """
         return self._stop(self._library.iss_run(self.handle, until_ps, self._reached))
 

@@ -43,9 +43,7 @@ def low_energy(bench: Bench) -> Bench:
             {"CMU.LFAPRESC0": 15 << 4, "RTC.IEN": 6, "RTC.COMP0": 0xFF_FFFF, "RTC.CTRL": 1},
             id="RTC compare at 1 Hz",
         ),
-        pytest.param(
-            {"BURTC.IEN": 1, "BURTC.CTRL": 1 | 1 << 12 | 7 << 8}, id="BURTC at 256 Hz"
-        ),
+        pytest.param({"BURTC.IEN": 1, "BURTC.CTRL": 1 | 1 << 12 | 7 << 8}, id="BURTC at 256 Hz"),
         pytest.param({"BURTC.IEN": 1, "BURTC.CTRL": 1 | 3 << 12 | 7 << 8}, id="BURTC at 1 kHz"),
     ],
 )

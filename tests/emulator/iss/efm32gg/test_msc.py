@@ -157,9 +157,7 @@ def test_word_that_misses_the_time_out_of_a_sequence_needs_a_new_trigger() -> No
 
 
 def test_dma_supplies_the_words_of_a_sequence() -> None:
-    bench = asleep(1).load(
-        "MSC", WRITECTRL=1, ADDRB=PAGE, WRITECMD=mask_of("MSC.WRITECMD.LADDRIM")
-    )
+    bench = asleep(1).load("MSC", WRITECTRL=1, ADDRB=PAGE, WRITECMD=mask_of("MSC.WRITECMD.LADDRIM"))
     data = [0x2000 + n for n in range(6)]
     bench.machine.poke(0x2000_1000, struct.pack("<6I", *data))
     bench["MSC.WDATA"] = data[0]
