@@ -37,7 +37,7 @@ ORDER = {
         "i2cdev recording faults",
         "boards",
     ),
-    "hdl": ("blocks", "flow", "cubestar cubesense", "proofs", "user", "contract"),
+    "hdl": ("blocks", "flow", "cubestar cubesense devboard", "proofs", "user", "contract"),
     "firmware_model": (
         "values",
         "interface",

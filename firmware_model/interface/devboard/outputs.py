@@ -54,9 +54,9 @@ def encode_deviation(position: int, predicted: int, found: int) -> bytes:
     return position.to_bytes(2, "little") + record + bytes([END_OF_RECORD])
 
 
-def is_full(records: int, size: int) -> bool:
-    """Whether an operation ends when its records have this size, with ``size`` output bytes."""
-    return records + 2 * (3 + 2 * size) > LONGEST_RECORDS
+def room(size: int) -> int:
+    """An operation of a design with ``size`` output bytes goes on with records up to this size."""
+    return LONGEST_RECORDS - 2 * (3 + 2 * size)
 
 
 def decode_deviations(records: bytes) -> list[Deviation]:

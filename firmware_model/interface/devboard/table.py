@@ -61,7 +61,7 @@ class Status(IntEnum):
     CHECK = 4, "stopped before a step CHECK whose output differs"
     FULL = 5, "stopped after a whole clock or step, because its response has no room for another"
     SKIPPED = 6, "did not execute it, because an operation before it did not end with OK"
-    REJECTED = 7, "has no such operation, camera or memory, or the request is too short"
+    REJECTED = 7, "has no such operation, camera or memory, or such a length or count"
     NAK = 8, "waits for the request with this number"
     CLOSED = 9, "waits for HELLO"
 
@@ -132,9 +132,8 @@ class Operation:
 _CAMERA = Parameter("camera", 1, "number of the camera whose clock runs")
 _MEMORY = Parameter("memory", 1, "number of the memory whose address and data are predicted")
 
-#: Each clock of RUN and STORE is: the camera's clock pin rises; the next sample is put on its data
-#: and line pins; the clock pin falls together with these. Outputs are taken after each edge. After
-#: each edge every memory's data input follows its data output while that is driven, else it is 0.
+#: Each clock of RUN and STORE is: the camera's clock pin rises, outputs are taken; the next sample is
+#: put on its data and line pins; the clock pin falls, outputs are taken. After each edge, every memory's data input follows its data output while that is driven, else it is 0.
 #: The clock pin must be low, and no memory may be reading. Both end with ACKNOWLEDGE after an edge
 #: that changed an acknowledge, and with READS after an edge at which a memory reads (CE_N and OE_N
 #: low, WE_N high); with ACKNOWLEDGE if both apply.

@@ -24,7 +24,7 @@ from cubestack.firmware_model.interface.devboard import (
     encode_deviation,
     encode_frame,
 )
-from cubestack.firmware_model.interface.devboard.outputs import is_full
+from cubestack.firmware_model.interface.devboard.outputs import room
 from cubestack.firmware_model.interface.devboard.table import BAUD, DAMAGED, MOST_EDGES, STEP_BYTE
 from cubestack.firmware_model.interface.pins import Pin
 
@@ -89,6 +89,7 @@ class DevboardModel:
         if hello:
             self._kept.clear()
             self._open = True
+            self._ended_early = False
         elif len(self._kept) == WINDOW:
             del self._kept[(frame.number - WINDOW) % 256]
         response = self._execute(frame)
@@ -159,12 +160,14 @@ class DevboardModel:
                 found = self._get()
                 records += encode_deviation(done, self._known.now, found)
                 self._known.now = found
-                if is_full(len(records), self.outputs.size) and done + 1 < count:
+                if len(records) > room(self.outputs.size) and done + 1 < count:
                     return Response(Status.FULL, done + 1, records)
         return Response(Status.OK, count, records)
 
     def _run(self, camera: int, memory: int, line: int, pixel: int, clocks: int) -> Response:
-        return self._clocks(camera, memory, line, [pixel] * min(clocks, MOST_EDGES // 2))
+        if 2 * clocks > MOST_EDGES:
+            raise ProtocolError(f"{clocks} clocks are too many")
+        return self._clocks(camera, memory, line, [pixel] * clocks)
 
     def _store(self, pixels: bytes, camera: int, memory: int) -> Response:
         return self._clocks(camera, memory, 1, pixels)
@@ -191,7 +194,7 @@ class DevboardModel:
                     return Response(Status.ACKNOWLEDGE, position + 1, records)
                 if self._reads(found):
                     return Response(Status.READS, position + 1, records)
-            if is_full(len(records), self.outputs.size) and clock + 1 < len(pixels):
+            if len(records) > room(self.outputs.size) and clock + 1 < len(pixels):
                 return Response(Status.FULL, 2 * clock + 2, records)
         return Response(Status.OK, 2 * len(pixels), records)
 
@@ -233,6 +236,6 @@ class DevboardModel:
                 self._known.edge(rising, found)
                 if self.outputs.get(found, ports.address) != address:
                     return Response(Status.ADDRESS, position + 1, records)
-            if is_full(len(records), self.outputs.size) and clock + 1 < len(data):
+            if len(records) > room(self.outputs.size) and clock + 1 < len(data):
                 return Response(Status.FULL, 2 * clock + 2, records)
         return Response(Status.OK, 2 * len(data), records)

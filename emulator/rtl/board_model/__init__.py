@@ -1,0 +1,1 @@
+"""A development board in simulation, bit by bit on its serial line."""
