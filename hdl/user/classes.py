@@ -20,7 +20,7 @@ def make_component(
     parameters: Mapping[str, Any],
     folder: Path | None = None,
 ) -> Any:
-    """The component, whose ports are those of ``pins``; raises GatewareError."""
+    """The component, whose ports are those of ``pins`` and further outputs; GatewareError."""
     name = f"{wanted.module}:{wanted.name}"
     kind = _load(wanted, name, str((folder or Path()).resolve()))
     known = [
@@ -75,9 +75,9 @@ def _misfits(component: Component, pins: tuple[Pin, ...]) -> Iterator[str]:
         if found.get(name) != (direction, port.width):
             shown = _words(*found[name]) if name in found else "none"
             yield f"pin {name}: wanted {_words(direction, port.width)}, found {shown}"
-    for name in found:
-        if name not in wanted:
-            yield f"pin {name}: found {_words(*found[name])}, but the board has no such pin"
+    for name, (direction, width) in found.items():
+        if name not in wanted and direction == "input":
+            yield f"pin {name}: found {_words(direction, width)}, but the board has no such pin"
 
 
 def _words(direction: str, width: int) -> str:

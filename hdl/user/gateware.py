@@ -9,6 +9,7 @@ from cubestack.firmware_model.interface.pins import Pin
 from cubestack.hdl.blocks.pinned import PinnedComponent, RtlilComponent, Stride, connect_ports
 from cubestack.hdl.flow.generate import rtlil_text
 from cubestack.hdl.user.classes import make_component
+from cubestack.hdl.user.ports import UNCONNECTED
 from cubestack.hdl.user.source import ClassName, GatewareError, parse_source
 from cubestack.hdl.user.verilog import Parameters, convert_verilog
 
@@ -74,7 +75,7 @@ def load_gateware(
 
     Args:
         text: FILE[:TOP], FILE,FILE...[:TOP], FOLDER[:TOP], LIST.f[:TOP] or MODULE:CLASS.
-        pins: the pin table, with the widths of the device.
+        pins: the pin table, with the widths of the device; a further output leads nowhere.
         parameters: parameters of the top module, or keyword arguments of the class.
         folder: where relative paths start, and where a class's module may lie; by default the
             current folder.
@@ -87,6 +88,18 @@ def load_gateware(
     source = parse_source(text, folder)
     if isinstance(source, ClassName):
         component = make_component(source, pins, parameters, folder)
-        return Gateware(pins, source.name, component=component)
+        known = {port.name for pin in pins for port in pin.ports}
+        further = tuple(
+            Pin(name, "output", UNCONNECTED, len(getattr(component, name)))
+            for name in component.signature.members
+            if name not in known
+        )
+        notices = _unconnected(source.name, further)
+        return Gateware((*pins, *further), source.name, component=component, notices=notices)
     converted = convert_verilog(source, pins, parameters)
-    return Gateware(pins, source.name, rtlil=converted.rtlil, notices=converted.notices)
+    notices = converted.notices + _unconnected(source.name, converted.pins[len(pins) :])
+    return Gateware(converted.pins, source.name, rtlil=converted.rtlil, notices=notices)
+
+
+def _unconnected(title: str, further: Iterable[Pin]) -> tuple[str, ...]:
+    return tuple(f"{title}: pin {pin} {UNCONNECTED}; traces show it" for pin in further)

@@ -8,12 +8,18 @@ from cubestack.hdl.user.netlist import Bit, Netlist
 from cubestack.hdl.user.source import GatewareError
 
 
-def fit_pins(netlist: Netlist, pins: Iterable[Pin], name: str) -> None:
-    """Give ``netlist`` exactly the ports of ``pins``; GatewareError with one line for each misfit.
+UNCONNECTED = "leads nowhere on the board"
+"""Meaning of an output that the board's pin table does not have."""
+
+
+def fit_pins(netlist: Netlist, pins: Iterable[Pin], name: str) -> tuple[Pin, ...]:
+    """Give ``netlist`` the ports of ``pins`` and of further outputs; returns all pins.
 
     A bidirectional pin is either NAME, an inout or an output that can be "z", or its three ports.
+    Raises GatewareError with one line for each misfit.
     """
     pins = tuple(pins)
+    pins += tuple(_further_outputs(netlist, pins))
     misfits = [*_misfits(netlist, pins)]
     if misfits:
         raise GatewareError("\n".join(f"{name}: {misfit}" for misfit in misfits))
@@ -32,6 +38,14 @@ def fit_pins(netlist: Netlist, pins: Iterable[Pin], name: str) -> None:
             f"{name}: {netlist.name_of(left['connections']['Y'])} can be 'z' but is no "
             "bidirectional pin of the board"
         )
+    return pins
+
+
+def _further_outputs(netlist: Netlist, pins: tuple[Pin, ...]) -> Iterator[Pin]:
+    known = {name.lower() for pin in pins for name in (pin, *(port.name for port in pin.ports))}
+    for name, port in netlist.ports.items():
+        if port["direction"] == "output" and name.lower() not in known:
+            yield Pin(name, "output", UNCONNECTED, len(port["bits"]))
 
 
 def _in_parts(found: dict[str, Any], pin: Pin) -> bool:

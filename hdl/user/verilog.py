@@ -45,6 +45,7 @@ class Converted(NamedTuple):
     """A design that fits its pins."""
 
     rtlil: str  #: one flat module, "top"
+    pins: tuple[Pin, ...]  #: the device's, and further outputs
     notices: tuple[str, ...]  #: one line each
 
 
@@ -73,9 +74,9 @@ class _Reader:
         notices = tuple(self._latches(netlist))
         if loop := netlist.loop():
             raise self._error(f"a loop of logic without a register: {', '.join(loop[:8])}")
-        fit_pins(netlist, pins, self._source.name)
+        pins = fit_pins(netlist, pins, self._source.name)
         name_nets(netlist)
-        return Converted(write_rtlil(netlist), notices)
+        return Converted(write_rtlil(netlist), pins, notices)
 
     def _flat(self, parameters: Parameters) -> dict[str, Any]:
         """Modules after Yosys has flattened the top one."""

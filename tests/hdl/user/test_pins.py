@@ -70,3 +70,11 @@ def test_misfit_is_one_line_that_names_the_pin(tmp_path, old, new, message):
     with pytest.raises(GatewareError) as caught:
         loaded(tmp_path, GOOD.replace(old, new).replace("CLK)", "CLK)"))
     assert message in str(caught.value)
+
+
+def test_further_output_is_a_pin_without_a_line(tmp_path):
+    text = GOOD.replace("output OUT\n", "output OUT, output [1:0] STATE\n")
+    gateware = loaded(tmp_path, text.replace("endmodule", "assign STATE = LEDS[3:2];\nendmodule"))
+    assert gateware.pins[:-1] == PINS
+    assert (gateware.pins[-1], gateware.pins[-1].width) == ("STATE", 2)
+    assert gateware.notices == ("counter.v: pin STATE leads nowhere on the board; traces show it",)
