@@ -5,6 +5,7 @@ reply, at once or when its transfer ends in virtual time.
 """
 
 import errno
+import os
 import struct
 from collections.abc import Callable
 
@@ -23,6 +24,9 @@ _LAST_7_BIT = 0x7F
 _LAST_10_BIT = 0x3FF
 _INT_MAX = 0x7FFF_FFFF
 _KNOWN_FLAGS = int(MessageFlag.READ | MessageFlag.DMA_SAFE | MessageFlag.RECEIVE_LENGTH)
+MODE_FLAGS = os.O_ACCMODE | os.O_PATH
+"""The flags of open(2) that decide which calls a file allows."""
+
 _U64 = struct.Struct("=Q")
 
 
@@ -30,12 +34,14 @@ class DeviceFile:
     """One opened device file; copies of its descriptor share it.
 
     Attributes:
+        mode: flags of open(2) in ``MODE_FLAGS``.
         address: target address for read, write and SMBus.
         ten_bit: whether that is a 10-bit address; transfers to one are not supported.
         checksums: whether SMBus transactions carry a packet error code.
     """
 
-    def __init__(self, adapter: I2cAdapter) -> None:
+    def __init__(self, adapter: I2cAdapter, flags: int = os.O_RDWR) -> None:
+        self.mode = flags & MODE_FLAGS
         self.address = 0
         self.ten_bit = False
         self.checksums = False
@@ -46,7 +52,12 @@ class DeviceFile:
         try:
             match call:
                 case Call.OPEN:
+                    self.mode = linux.unpack_open(body) & MODE_FLAGS
                     done(linux.reply(0))
+                case Call.MODE:
+                    done(linux.reply(self.mode))
+                case _ if not self._allows(call):
+                    raise OSError(errno.EBADF, f"the file's mode does not allow {call.name}")
                 case Call.IOCTL:
                     done(self._ioctl(*linux.unpack_ioctl(body)))
                 case Call.RDWR:
@@ -61,6 +72,17 @@ class DeviceFile:
             done(_failed(error))
 
     def close(self) -> None: ...
+
+    def _allows(self, call: Call) -> bool:
+        """Whether the flags of open allow ``call``; ioctl needs neither reading nor writing."""
+        if self.mode & os.O_PATH:
+            return False
+        match call:
+            case Call.READ:
+                return self.mode in (os.O_RDONLY, os.O_RDWR)
+            case Call.WRITE:
+                return self.mode in (os.O_WRONLY, os.O_RDWR)
+        return True
 
     def _ioctl(self, number: int, argument: int) -> bytes:
         match number:

@@ -22,9 +22,10 @@ from typing import Literal
 
 from cubestack.emulator.i2cdev.device_node import DeviceNode
 from cubestack.emulator.i2cdev.preload.shim import is_static
-from cubestack.emulator.i2cdev.seccomp.filter import make_filter, native_abi
+from cubestack.emulator.i2cdev.seccomp.abi import native_abi
+from cubestack.emulator.i2cdev.seccomp.filter import make_filter
 from cubestack.emulator.i2cdev.seccomp.notify import Listener, read_memory
-from cubestack.emulator.i2cdev.seccomp.supervisor import Files, Supervisor, descriptor_range
+from cubestack.emulator.i2cdev.seccomp.supervisor import Files, Supervisor
 from cubestack.emulator.ports.endpoint import Endpoint, poll_now
 
 Route = Literal["seccomp", "preload"]
@@ -37,6 +38,12 @@ SEPARATORS = frozenset(": \t\n")
 
 SIGNALLED = 128
 """Exit status of a program that a signal ended, minus the signal's number, as in shells."""
+
+
+Streams = tuple[int | None, int | None]
+"""Descriptors for a program's standard output and standard error; None: those of this process."""
+
+INHERITED: Streams = (None, None)
 
 
 class RouteError(RuntimeError):
@@ -88,7 +95,11 @@ class GuestProcess(Endpoint):
 
 
 def start_filtered(
-    command: Sequence[str], environment: dict[str, str], node: DeviceNode, files: Files
+    command: Sequence[str],
+    environment: dict[str, str],
+    node: DeviceNode,
+    files: Files,
+    streams: Streams = INHERITED,
 ) -> tuple[GuestProcess, Supervisor]:
     """Start ``command`` under a supervisor, which the caller must serve from now on.
 
@@ -97,7 +108,6 @@ def start_filtered(
     abi = native_abi()
     if abi is None:
         raise RouteError(f"system calls of {os.uname().machine} are not supported")
-    numbers = descriptor_range()
     # With yama, a process may read only the memory of its descendants.
     ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -108,20 +118,22 @@ def start_filtered(
             [*launch, str(abi.seccomp), *command],
             env=os.environ | environment,
             close_fds=False,  # the program inherits our descriptors
+            stdout=streams[0],
+            stderr=streams[1],
         )
         theirs.close()
         _check_access(process)
-        ours.send(make_filter(abi, numbers))
+        ours.send(make_filter(abi))
         answer, descriptors, _, _ = socket.recv_fds(ours, MESSAGE_BYTES, 1)
     if not descriptors:
         process.wait()
         raise RouteError(answer[1:].decode() or "the launcher failed")
-    supervisor = Supervisor(Listener(descriptors[0]), abi, node, numbers, files)
+    supervisor = Supervisor(Listener(descriptors[0]), abi, node, files)
     return GuestProcess(process, command[0], reaps_children=True), supervisor
 
 
 def start_preloaded(
-    command: Sequence[str], environment: dict[str, str], library: Path
+    command: Sequence[str], environment: dict[str, str], library: Path, streams: Streams = INHERITED
 ) -> GuestProcess:
     """Start ``command`` with the shim ``library``; the caller must serve the socket it uses.
 
@@ -135,7 +147,11 @@ def start_preloaded(
     others = os.environ.get("LD_PRELOAD")
     preload = f"{library} {others}" if others else str(library)
     process = subprocess.Popen(
-        command, env=os.environ | environment | {"LD_PRELOAD": preload}, close_fds=False
+        command,
+        env=os.environ | environment | {"LD_PRELOAD": preload},
+        close_fds=False,
+        stdout=streams[0],
+        stderr=streams[1],
     )
     return GuestProcess(process, command[0])
 

@@ -1,6 +1,7 @@
 """The bus of an emulation in another process, reached through its socket."""
 
 import errno
+import os
 import select
 import socket
 from collections import deque
@@ -9,7 +10,14 @@ from functools import partial
 from pathlib import Path
 
 from cubestack.emulator.ports.endpoint import Endpoint, PortError
-from cubestack.firmware_model.formats.linux_i2c import LENGTH, Call, reply, request, take_packet
+from cubestack.firmware_model.formats.linux_i2c import (
+    LENGTH,
+    Call,
+    pack_open,
+    reply,
+    request,
+    take_packet,
+)
 
 CHUNK_BYTES = 1 << 16
 Done = Callable[[bytes], None]
@@ -25,13 +33,14 @@ class RemoteBus(Endpoint):
         self._poller = select.epoll()
         self._connect().close()
 
-    def open(self) -> "_RemoteFile":
-        """Open a device file; raises PortError."""
+    def open(self, flags: int = os.O_RDWR) -> "_RemoteFile":
+        """Open a device file with flags of open(2); raises PortError."""
         link = self._connect()
         fileno = link.fileno()
         self._poller.register(fileno, select.EPOLLIN)
         file = _RemoteFile(link, partial(self._poller.modify, fileno), partial(self._drop, fileno))
         self._files[fileno] = file
+        file.perform(Call.OPEN, pack_open(flags), lambda _reply: None)
         return file
 
     def _drop(self, fileno: int) -> None:

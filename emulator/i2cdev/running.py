@@ -1,9 +1,13 @@
 """Runs a program with an emulated bus, from its start to its end."""
 
+import contextlib
 import gc
 import signal
+import subprocess
+import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Literal
 
@@ -42,7 +46,7 @@ def emulated_bus(
 ) -> HostBus:
     """The bus of an emulation in this process; also serves it at ``path``. Raises PortError."""
     server = I2cServer(path, adapter)
-    return HostBus(kernel, busy, adapter, server, lambda: DeviceFile(adapter), server.name)
+    return HostBus(kernel, busy, adapter, server, partial(DeviceFile, adapter), server.name)
 
 
 def attached_bus(path: Path) -> HostBus:
@@ -58,6 +62,8 @@ def run_program(
     *,
     pace: Literal["real", "fast"],
     route: guest_process.Route | None = None,
+    streams: guest_process.Streams = guest_process.INHERITED,
+    timeout_s: float | None = None,
     report: Callable[[str], None] = lambda _text: None,
 ) -> int:
     """Run ``command``, for which ``bus`` is /dev/i2c-``number``; returns its exit status.
@@ -66,6 +72,7 @@ def run_program(
     Processes that the program leaves behind are also served until they end.
 
     Raises:
+        subprocess.TimeoutExpired: after ``timeout_s`` of wall time; the program is killed.
         RouteError: the route is not available.
         CompilerError: the library of the preload route can not be built.
     """
@@ -80,12 +87,15 @@ def run_program(
 
     handlers = {number: signal.signal(number, end) for number in (*FORWARDED, signal.SIGINT)}
     try:
-        program, supervisor, reason = _start(command, number, bus, route)
+        program, supervisor, reason = _start(command, number, bus, route, streams)
         running.append(run := _Run(program, supervisor))
         for each in early:
             run.signalled(each)
         report(f"/dev/i2c-{number} is served by {reason}")
-        _serve(bus, run, pace=pace, report=report)
+        with _Limit(timeout_s, run) as limit:
+            _serve(bus, run, pace=pace, report=report)
+        if limit.reached:
+            raise subprocess.TimeoutExpired(list(command), timeout_s or 0.0)
     finally:
         for signal_number, handler in handlers.items():
             signal.signal(signal_number, handler)
@@ -163,6 +173,12 @@ class _Run(Endpoint):
         elif number != signal.SIGINT:
             self._program.send(number)
 
+    def kill(self) -> None:
+        """End the program, and serve none of its processes any more."""
+        self._dropped = True
+        with contextlib.suppress(ProcessLookupError):
+            self._program.send(signal.SIGKILL)
+
     def exchange(self, now_ps: int) -> None:
         """Call ``on_end`` at the end; ``ports`` are served separately."""
         if self.ended:
@@ -173,8 +189,39 @@ class _Run(Endpoint):
             port.close()
 
 
+class _Limit:
+    """Kills a program after a time.
+
+    Attributes:
+        reached: whether it was killed.
+    """
+
+    def __init__(self, timeout_s: float | None, run: _Run) -> None:
+        self.reached = False
+        self._run = run
+        self._timer = None if timeout_s is None else threading.Timer(timeout_s, self._kill)
+
+    def _kill(self) -> None:
+        self.reached = True
+        self._run.kill()
+
+    def __enter__(self) -> "_Limit":
+        if self._timer:
+            self._timer.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._timer:
+            self._timer.cancel()
+            self._timer.join()
+
+
 def _start(
-    command: Sequence[str], number: int, bus: HostBus, route: guest_process.Route | None
+    command: Sequence[str],
+    number: int,
+    bus: HostBus,
+    route: guest_process.Route | None,
+    streams: guest_process.Streams,
 ) -> tuple[guest_process.GuestProcess, Supervisor | None, str]:
     """Start the program: it, its supervisor or None, and the route with its reason."""
     environment = guest_process.bus_environment(number, bus.path)
@@ -182,7 +229,7 @@ def _start(
     if route != "preload":
         try:
             program, supervisor = guest_process.start_filtered(
-                command, environment, DeviceNode(number), bus.files
+                command, environment, DeviceNode(number), bus.files, streams
             )
         except guest_process.RouteError as error:
             if route == "seccomp":
@@ -192,7 +239,7 @@ def _start(
             reason = "as requested" if route else "which works with any program"
             return program, supervisor, f"seccomp, {reason}"
     try:
-        program = guest_process.start_preloaded(command, environment, shim_library())
+        program = guest_process.start_preloaded(command, environment, shim_library(), streams)
     except guest_process.RouteError as error:
         raise guest_process.RouteError(f"preload: {error}{refused}") from None
     return program, None, f"preload{refused or ', as requested'}"

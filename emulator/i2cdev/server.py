@@ -1,9 +1,9 @@
 """The I2C bus of a running emulation on a Unix socket: a port for any number of clients.
 
 A client's calls run one after the other, in virtual time; transfers of several clients queue for
-the wire. Calls that a client sends too early wait in the operating system, and so does a new client
-beyond ``MAX_CLIENTS``. A client that sends malformed calls is disconnected. If a client disconnects
-during its transfer, the transfer completes.
+the wire. Calls that a client sends too early wait in the operating system. A new client for which
+this process has no descriptor left gets ENFILE. A client that sends malformed calls is
+disconnected. If a client disconnects during its transfer, the transfer completes.
 """
 
 import contextlib
@@ -17,12 +17,10 @@ from functools import partial
 from pathlib import Path
 
 from cubestack.emulator.i2cdev.adapter import I2cAdapter
+from cubestack.emulator.i2cdev.descriptors import has_room
 from cubestack.emulator.i2cdev.device_file import DeviceFile
 from cubestack.emulator.ports.endpoint import Endpoint, PortError
 from cubestack.firmware_model.formats import linux_i2c as linux
-
-MAX_CLIENTS = 64
-"""Limit of connections; a program uses one, and one per open device file."""
 
 CHUNK_BYTES = 1 << 16
 HUNG_UP = select.EPOLLHUP | select.EPOLLERR
@@ -49,7 +47,7 @@ class I2cServer(Endpoint):
         except OSError as error:
             self._socket.close()
             raise PortError(f"can not create {path}: {_reason(error)}") from error
-        self._socket.listen(MAX_CLIENTS)
+        self._socket.listen(socket.SOMAXCONN)
         self._socket.setblocking(False)
         self._poller = select.epoll()
         self._poller.register(self._socket, select.EPOLLIN)
@@ -77,16 +75,15 @@ class I2cServer(Endpoint):
         except OSError:  # it has gone again
             return
         fileno = connection.fileno()
+        if not has_room(fileno):
+            _refuse(connection)
+            return
         self._poller.register(fileno, select.EPOLLIN)
         self._clients[fileno] = _Client(
             connection, self._adapter, self._files, partial(self._poller.modify, fileno)
         )
-        if len(self._clients) == MAX_CLIENTS:
-            self._poller.unregister(self._socket)
 
     def _drop(self, fileno: int) -> None:
-        if len(self._clients) == MAX_CLIENTS:
-            self._poller.register(self._socket, select.EPOLLIN)
         self._poller.unregister(fileno)
         self._clients.pop(fileno).close()
 
@@ -203,6 +200,12 @@ class _Client:
         self._socket.close()
         if self._key and self._files.get(self._key) is self._file:
             del self._files[self._key]
+
+
+def _refuse(connection: socket.socket) -> None:
+    answer = linux.reply(-errno.ENFILE)
+    with connection, contextlib.suppress(OSError):
+        connection.send(linux.LENGTH.pack(len(answer)) + answer)
 
 
 def _make_private(folder: Path) -> None:

@@ -6,12 +6,14 @@ socket each message follows its length (u32):
 
 ========  =====================================================================================
 request   key u64, call u8, body; the key names an opened file, 0 is the connection's own
-OPEN      no body; from now on the key names the connection's own file
+OPEN      flags u32 as of open(2), or no body for O_RDWR; from now on the key names the
+          connection's own file
 IOCTL     request u32, argument u64: the requests without a pointer argument, and FUNCS
 RDWR      per message: address u16, flags u16, length u16, sent u16, then ``sent`` bytes
 SMBUS     direction u8, command u8, data given u8, pad u8, size u32, data 34 bytes (filled up)
 READ      count u64
 WRITE     bytes
+MODE      no body; the result is the file's access mode: of its flags, O_ACCMODE and O_PATH
 reply     result i32 (0 or more, or a negative errno), data
 ========  =====================================================================================
 """
@@ -97,6 +99,7 @@ class Call(IntEnum):
     SMBUS = 3
     READ = 4
     WRITE = 5
+    MODE = 6
 
 
 LENGTH = struct.Struct("=I")
@@ -105,6 +108,7 @@ _IOCTL = struct.Struct("=IQ")
 _MESSAGE = struct.Struct("=HHHH")
 _SMBUS = struct.Struct(f"=BBBxI{SMBUS_DATA_BYTES}s")
 _COUNT = struct.Struct("=Q")
+_FLAGS = struct.Struct("=I")
 _RESULT = struct.Struct("=i")
 
 MAX_REQUEST_BYTES = _HEAD.size + MAX_MESSAGES * (_MESSAGE.size + MAX_MESSAGE_BYTES)
@@ -247,6 +251,14 @@ def pack_read(count: int) -> bytes:
 def unpack_read(body: bytes) -> int:
     """Number of requested bytes; raises ValueError, like all unpack functions here."""
     return int(_unpack(_COUNT, body)[0])
+
+
+def pack_open(flags: int) -> bytes:
+    return _FLAGS.pack(flags)
+
+
+def unpack_open(body: bytes) -> int:
+    return int(_unpack(_FLAGS, body)[0]) if body else os.O_RDWR
 
 
 def _unpack(form: struct.Struct, data: bytes) -> tuple[Any, ...]:

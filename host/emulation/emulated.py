@@ -139,19 +139,38 @@ class EmulatedDevice(Closable, Generic[BoardT_co, ClientT_co]):
             finally:
                 endpoint.close()
 
-    def run_on_i2c(self, *command: str | Path, bus: int = 7) -> int:
-        """Run a program that sees the device on /dev/i2c-``bus``; returns its exit status."""
+    def run_on_i2c(
+        self, *command: str | Path, bus: int = 7, timeout_s: float = 60.0
+    ) -> subprocess.CompletedProcess[str]:
+        """Run a program that sees the device on /dev/i2c-``bus``; returns exit status and output.
+
+        Raises subprocess.TimeoutExpired after ``timeout_s`` of wall time.
+        """
         from cubestack.emulator.i2cdev.adapter import I2cAdapter
         from cubestack.emulator.i2cdev.running import emulated_bus, run_program
 
         adapter = I2cAdapter(self.board.kernel, self.board.i2c_bus)
-        with tempfile.TemporaryDirectory(prefix="cubestack-") as folder:
-            path = Path(folder) / "bus"
-            opened = emulated_bus(self.board.kernel, self.board.busy, adapter, path)
+        words = [str(word) for word in command]
+        with (
+            tempfile.TemporaryDirectory(prefix="cubestack-") as folder,
+            tempfile.TemporaryFile("w+") as output,
+            tempfile.TemporaryFile("w+") as errors,
+        ):
+            opened = emulated_bus(self.board.kernel, self.board.busy, adapter, Path(folder) / "bus")
             try:
-                return run_program([str(word) for word in command], bus, opened, pace="fast")
+                status = run_program(
+                    words,
+                    bus,
+                    opened,
+                    pace="fast",
+                    streams=(output.fileno(), errors.fileno()),
+                    timeout_s=timeout_s,
+                )
             finally:
                 opened.port.close()
+            output.seek(0)
+            errors.seek(0)
+            return subprocess.CompletedProcess(words, status, output.read(), errors.read())
 
     def close(self) -> None:
         """Power down."""

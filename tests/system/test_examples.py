@@ -68,7 +68,7 @@ def test_flight_driver_reports_a_missing_port(flight_driver: Path) -> None:
 
 
 def test_smbus2_example_prints_the_attitude(device: Any, capfd: pytest.CaptureFixture[str]) -> None:
-    assert device.run_on_i2c(sys.executable, HERE / "smbus2_attitude.py", "7") == 0
+    assert device.run_on_i2c(sys.executable, HERE / "smbus2_attitude.py", "7").returncode == 0
     check_attitude(device, capfd.readouterr().out)
 
 

@@ -1,64 +1,47 @@
 """The seccomp filter that sends a program's calls to its supervisor, as classic BPF.
 
 It sends only calls that may concern the device file: those with a path, the ioctl requests of
-Linux's I2C devices, and calls on descriptors in the supervisor's range. All others run at full
-speed.
+Linux's I2C devices, and reads, writes and their like on descriptors from ``FIRST`` on. All others
+run at full speed. io_uring would bypass the filter, so it does not exist for the program.
 """
 
-import platform
+import errno
 import struct
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable
 
+from cubestack.emulator.i2cdev.seccomp.abi import Abi
 from cubestack.firmware_model.formats.linux_i2c import Ioctl
 
+FIRST = 3
+"""Lowest descriptor of a device file. The standard streams stay at full speed."""
+
 AT_EMPTY_PATH = 0x1000
+EPOLL_CTL_ADD = 1
 F_DUPFD = 0
+F_GETFL = 3
 F_DUPFD_CLOEXEC = 1030
 
+FIONREAD, TIOCOUTQ, FIOASYNC = 0x541B, 0x5411, 0x5452
+SOCKET_REQUESTS = range(0x8900, 0x8A00)
+"""Requests of ioctl that sockets have, and device files have not."""
+
 ON_PATH = (
-    *("open", "openat", "openat2", "stat", "lstat", "newfstatat", "statx"),
+    *("open", "creat", "openat", "openat2", "stat", "lstat", "newfstatat", "statx"),
     *("access", "faccessat", "faccessat2", "readlink", "readlinkat"),
     *("getxattr", "lgetxattr"),
 )
-ON_DESCRIPTOR = ("read", "write", "readv", "writev", "fstat", "dup")
-
-
-@dataclass(frozen=True)
-class Abi:
-    """System call interface of a processor architecture."""
-
-    audit_arch: int  # AUDIT_ARCH_* of linux/audit.h
-    calls: Mapping[str, int]  # system call numbers by name
-    seccomp: int  # number of the call that installs a filter
-    compact_stat: bool  # whether struct stat is that of asm-generic/stat.h
-
-
-def _calls(table: str) -> dict[str, int]:
-    words = table.split()
-    return {name: int(number) for name, number in zip(words[::2], words[1::2], strict=True)}
-
-
-_X86_64 = _calls("""
-    read 0 write 1 open 2 stat 4 fstat 5 lstat 6 ioctl 16 readv 19 writev 20 access 21 dup 32
-    fcntl 72 readlink 89 getxattr 191 lgetxattr 192 openat 257 newfstatat 262 readlinkat 267
-    faccessat 269 statx 332 openat2 437 faccessat2 439
-""")
-_GENERIC = _calls("""
-    getxattr 8 lgetxattr 9 dup 23 fcntl 25 ioctl 29 faccessat 48 openat 56 read 63 write 64 readv 65
-    writev 66 readlinkat 78 newfstatat 79 fstat 80 statx 291 openat2 437 faccessat2 439
-""")
-
-#: By the kernel's name of the machine.
-ABIS = {
-    "x86_64": Abi(0xC000_003E, _X86_64, 317, compact_stat=False),
-    "aarch64": Abi(0xC000_00B7, _GENERIC, 277, compact_stat=True),
-    "riscv64": Abi(0xC000_00F3, _GENERIC, 277, compact_stat=True),
-}
+ON_DESCRIPTOR = (
+    *("read", "write", "readv", "writev", "pread64", "pwrite64"),
+    *("preadv", "pwritev", "preadv2", "pwritev2", "fstat", "dup", "getdents64"),
+)
+ALWAYS = ("sendfile", "splice", "copy_file_range")
+"""Calls on two descriptors; they are rare."""
 
 _RET_ALLOW = 0x7FFF_0000
 _RET_NOTIFY = 0x7FC0_0000
+_RET_ERRNO = 0x0005_0000
 _X32_BIT = 0x4000_0000
+_NEGATIVE = 0x8000_0000
 
 _LOAD, _EQUAL, _AT_LEAST, _ANY_BIT, _RETURN = 0x20, 0x15, 0x35, 0x45, 0x06
 _NUMBER, _ARCH, _ARGUMENT = 0, 4, 16
@@ -66,12 +49,7 @@ _NUMBER, _ARCH, _ARGUMENT = 0, 4, 16
 Step = tuple[int, int, str, str]  # code, operand, label if true, label if false; "": next step
 
 
-def native_abi() -> Abi | None:
-    """The ABI of this machine; None if it is not supported."""
-    return ABIS.get(platform.machine())
-
-
-def make_filter(abi: Abi, descriptors: range) -> bytes:
+def make_filter(abi: Abi) -> bytes:
     """The filter program, as an array of struct sock_filter."""
     steps: list[Step | str] = [
         (_LOAD, _ARCH, "", ""),
@@ -79,25 +57,33 @@ def make_filter(abi: Abi, descriptors: range) -> bytes:
         (_LOAD, _NUMBER, "", ""),
         (_AT_LEAST, _X32_BIT, "allow", ""),
     ]
-    calls = abi.calls
-    steps += [(_EQUAL, calls["ioctl"], "ioctl", "")]
+    steps += _jumps(("ioctl",), abi, "ioctl")
     steps += _jumps(ON_DESCRIPTOR, abi, "descriptor")
-    steps += [
-        (_EQUAL, calls["fcntl"], "fcntl", ""),
-        (_EQUAL, calls["newfstatat"], "empty path", ""),
-    ]
-    steps += _jumps(ON_PATH, abi, "notify")
+    steps += _jumps(("fcntl",), abi, "fcntl")
+    steps += _jumps(("newfstatat",), abi, "empty path")
+    steps += _jumps(("epoll_ctl",), abi, "epoll")
+    steps += _jumps(("dup2", "dup3"), abi, "duplicate")
+    steps += _jumps(("io_uring_setup",), abi, "missing")
+    steps += _jumps((*ON_PATH, *ALWAYS), abi, "notify")
     steps += ["allow", (_RETURN, _RET_ALLOW, "", "")]
+    steps += ["missing", (_RETURN, _RET_ERRNO | errno.ENOSYS, "", "")]
     steps += ["ioctl", (_LOAD, _low(1), "", "")]
     steps += [(_EQUAL, number, "notify", "") for number in Ioctl]
-    steps += [(_RETURN, _RET_ALLOW, "", "")]
+    steps += [(_EQUAL, number, "descriptor", "") for number in (FIONREAD, TIOCOUTQ, FIOASYNC)]
+    steps += [(_AT_LEAST, SOCKET_REQUESTS.stop, "allow 2", "")]
+    steps += [(_AT_LEAST, SOCKET_REQUESTS.start, "descriptor", "allow 2")]
     steps += ["fcntl", (_LOAD, _low(1), "", "")]
-    steps += [(_EQUAL, F_DUPFD, "descriptor", ""), (_EQUAL, F_DUPFD_CLOEXEC, "descriptor", "")]
-    steps += [(_RETURN, _RET_ALLOW, "", "")]
+    steps += [(_EQUAL, F_GETFL, "descriptor", "")]
+    steps += [(_EQUAL, F_DUPFD, "lowest", ""), (_EQUAL, F_DUPFD_CLOEXEC, "lowest", "allow 2")]
+    steps += ["lowest", (_LOAD, _low(2), "", ""), (_AT_LEAST, FIRST, "allow 2", "descriptor")]
+    steps += ["epoll", (_LOAD, _low(1), "", ""), (_EQUAL, EPOLL_CTL_ADD, "", "allow 2")]
+    steps += [(_LOAD, _low(2), "", ""), (_AT_LEAST, _NEGATIVE, "allow 2", "")]
+    steps += [(_AT_LEAST, FIRST, "notify", "allow 2")]
+    steps += ["duplicate", (_LOAD, _low(1), "", ""), (_AT_LEAST, FIRST, "allow 2", "notify")]
     steps += ["empty path", (_LOAD, _low(3), "", ""), (_ANY_BIT, AT_EMPTY_PATH, "", "notify")]
     steps += ["descriptor", (_LOAD, _low(0), "", "")]
-    steps += [(_AT_LEAST, descriptors.stop, "allow 2", "")]
-    steps += [(_AT_LEAST, descriptors.start, "notify", "")]
+    steps += [(_AT_LEAST, _NEGATIVE, "allow 2", "")]
+    steps += [(_AT_LEAST, FIRST, "notify", "")]
     steps += ["allow 2", (_RETURN, _RET_ALLOW, "", "")]
     steps += ["notify", (_RETURN, _RET_NOTIFY, "", "")]
     return _assemble(steps)

@@ -12,6 +12,9 @@ from cubestack.firmware_model.formats import linux_i2c as linux
 MAX_PARTS = 1024
 """Limit of the parts of a vector: UIO_MAXIOV."""
 
+RWF_HIPRI = 1
+CURRENT_POSITION = (1 << 64) - 1
+
 _RDWR = struct.Struct("=QI4x")
 _MESSAGE = struct.Struct("=HHH2xQ")
 _SMBUS = struct.Struct("=BB2xIQ")
@@ -43,26 +46,53 @@ def ioctl(call: Notification) -> Marshalled:
             return Marshalled(linux.Call.IOCTL, linux.pack_ioctl(number, argument), _without_data)
 
 
-def read(call: Notification, *, vector: bool = False) -> Marshalled:
-    """A read; of a ``vector``, only the first part is read, as a short read. Raises OSError."""
-    place, count = _first_part(call) if vector else call.arguments[1:3]
-    body = linux.pack_read(min(count, linux.MAX_MESSAGE_BYTES))
-    return Marshalled(linux.Call.READ, body, partial(_put, call.pid, place))
+class Transfer(NamedTuple):
+    """A read or a write, as its parts in the program's memory; each is a call of its own.
+
+    So Linux performs them on a device without vectors (fs/read_write.c, do_loop_readv_writev).
+    """
+
+    reading: bool
+    parts: list[tuple[int, int]]  # place and number of bytes
+
+    def part(self, pid: int, place: int, count: int) -> Marshalled:
+        """One part as a call; raises OSError."""
+        count = min(count, linux.MAX_MESSAGE_BYTES)
+        if self.reading:
+            return Marshalled(linux.Call.READ, linux.pack_read(count), partial(_put, pid, place))
+        return Marshalled(linux.Call.WRITE, read_memory(pid, place, count), _without_data)
 
 
-def write(call: Notification, *, vector: bool = False) -> Marshalled:
-    """A write; of a ``vector``, only the first part is written. Raises OSError."""
-    place, count = _first_part(call) if vector else call.arguments[1:3]
-    data = read_memory(call.pid, place, min(count, linux.MAX_MESSAGE_BYTES))
-    return Marshalled(linux.Call.WRITE, data, _without_data)
+def plain(call: Notification, *, reading: bool, positioned: bool = False) -> Transfer:
+    """Of read and write; ``positioned``: of pread and pwrite, whose offset is ignored.
+
+    Raises OSError EINVAL for a negative offset.
+    """
+    if positioned and call.arguments[3] >> 63:
+        raise OSError(errno.EINVAL, "the offset is negative")
+    return Transfer(reading, [(call.arguments[1], call.arguments[2])])
 
 
-def _first_part(call: Notification) -> tuple[int, int]:
-    count = call.arguments[2]
+def vector(
+    call: Notification, *, reading: bool, positioned: bool = False, flags: bool = False
+) -> Transfer:
+    """Of readv and writev; ``positioned``: of preadv and pwritev; ``flags``: of preadv2, pwritev2.
+
+    Raises OSError.
+    """
+    _, place, count, offset, _, chosen = call.arguments
+    if positioned and offset >> 63 and not (flags and offset == CURRENT_POSITION):
+        raise OSError(errno.EINVAL, "the offset is negative")
     if count > MAX_PARTS:
         raise OSError(errno.EINVAL, f"a vector has at most {MAX_PARTS} parts, not {count}")
-    table = read_memory(call.pid, call.arguments[1], count * _PART.size)
-    return next(((place, size) for place, size in _PART.iter_unpack(table) if size), (0, 0))
+    parts = list(_PART.iter_unpack(read_memory(call.pid, place, count * _PART.size)))
+    if any(size >> 63 for _, size in parts):
+        raise OSError(errno.EINVAL, "a part has a negative size")
+    if flags and chosen & 0xFFFF_FFFF & ~RWF_HIPRI:
+        raise OSError(errno.EOPNOTSUPP, "flags of a read or write are not supported")
+    while parts and not parts[-1][1]:
+        parts.pop()
+    return Transfer(reading, parts)
 
 
 def _rdwr(call: Notification, argument: int) -> Marshalled:

@@ -95,22 +95,30 @@ class Listener:
         self._send(_RESPONSE.pack(call.id, max(0, result), min(0, result), 0))
 
     def answer_with_descriptor(
-        self, call: Notification, fd: int, number: int, *, close_on_exec: bool
+        self, call: Notification, fd: int, number: int | None, *, close_on_exec: bool
     ) -> None:
-        """Install a copy of ``fd`` in the process as ``number``, which the call returns."""
-        how = _AT_NUMBER | _AND_SEND if self._can_add_and_send else _AT_NUMBER
+        """Install a copy of ``fd`` in the process, whose number the call returns.
+
+        ``number`` None: the lowest free one. Raises OSError, EMFILE at the process's limit.
+        """
+        how = 0 if number is None else _AT_NUMBER
+        how |= _AND_SEND if self._can_add_and_send else 0
         flags = os.O_CLOEXEC if close_on_exec else 0
+        addition = bytearray(_ADDITION.pack(call.id, how, fd, number or 0, flags))
         try:
-            fcntl.ioctl(self.fd, _ADD_DESCRIPTOR, _ADDITION.pack(call.id, how, fd, number, flags))
+            installed = fcntl.ioctl(self.fd, _ADD_DESCRIPTOR, addition, True)
         except OSError as error:
-            if not self._can_add_and_send or error.errno != errno.EINVAL:
-                self.answer(call, -(error.errno or errno.EIO))
+            if error.errno == errno.ENOENT:  # killed meanwhile
                 return
+            if error.errno == errno.EBADF and number is not None:
+                raise OSError(errno.EMFILE, f"{number} is above the process's limit") from None
+            if not self._can_add_and_send or error.errno != errno.EINVAL:
+                raise
             self._can_add_and_send = False  # before Linux 5.14
             self.answer_with_descriptor(call, fd, number, close_on_exec=close_on_exec)
         else:
             if not self._can_add_and_send:
-                self.answer(call, number)
+                self.answer(call, installed)
 
     def _send(self, response: bytes) -> None:
         try:

@@ -27,7 +27,7 @@ NODE = DeviceNode(7)
     ],
 )
 def test_device_paths_are_recognised(path, found):
-    assert (NODE.find(path, os.getpid(), None) if NODE.may_match(path) else None) is found
+    assert NODE.find(path, os.getpid(), None) is found
 
 
 def test_relative_device_paths_are_recognised(monkeypatch):
@@ -41,6 +41,49 @@ def test_relative_device_paths_are_recognised(monkeypatch):
     finally:
         os.close(folder)
     assert NODE.find("i2c-7", os.getpid(), 9999) is None
+
+
+def test_symbolic_links_to_the_device_are_followed(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    targets = {
+        "bus": "/dev/i2c-7",
+        "chain": "bus",
+        "loop": "loop",
+        "dev": "/dev",
+        "other": "/dev/x",
+    }
+    for name, target in targets.items():
+        (tmp_path / name).symlink_to(target)
+    for path in ("bus", "chain", "./chain", f"{tmp_path}/chain", "dev/i2c-7"):
+        assert NODE.find(path, os.getpid(), None) is Found.DEVICE, path
+    for path in ("loop", "other", "missing", "dev"):
+        assert NODE.find(path, os.getpid(), None) is None, path
+    assert NODE.find("bus", os.getpid(), None, follow=False) is None
+    assert NODE.find("dev/i2c-7", os.getpid(), None, follow=False) is Found.DEVICE
+
+
+@pytest.mark.parametrize(
+    ("path", "process", "fd"),
+    [
+        ("/proc/self/fd/5", 77, 5),
+        ("/proc/thread-self/fd/5", 77, 5),
+        ("/dev/fd/12", 77, 12),
+        ("/dev/stdin", 77, 0),
+        ("/proc/99/fd/3", 99, 3),
+        ("/proc/99/task/100/fd/3", 99, 3),
+    ],
+)
+def test_links_in_proc_to_an_opened_device_are_followed(path, process, fd):
+    asked = []
+
+    def is_ours(*place):
+        asked.append(place)
+        return True
+
+    assert NODE.find(path, 77, None, is_ours=is_ours) is Found.DEVICE
+    assert NODE.is_own_link(path, 77, is_ours)
+    assert asked == [(process, fd)] * 2
+    assert NODE.find(path, 77, None, follow=False, is_ours=is_ours) is None
 
 
 @pytest.mark.skipif(ctypes.sizeof(ctypes.c_void_p) != 8, reason="structures of 64-bit machines")

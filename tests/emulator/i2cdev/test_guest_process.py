@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from cubestack.emulator.i2cdev import guest_process as program
 from cubestack.emulator.i2cdev.device_node import DeviceNode
 from cubestack.emulator.i2cdev.preload import shim
-from cubestack.emulator.i2cdev.seccomp.filter import native_abi
+from cubestack.emulator.i2cdev.seccomp.abi import native_abi
 from cubestack.emulator.native.compiler import CompilerError, NoCompilerError
 
 needs_abi = pytest.mark.skipif(native_abi() is None, reason="no filter for this machine")
@@ -42,7 +42,7 @@ def test_unreadable_guest_memory_raises_route_error(monkeypatch):
 
 @needs_abi
 def test_refused_seccomp_filter_raises_route_error(monkeypatch):
-    monkeypatch.setattr(program, "make_filter", lambda _abi, _numbers: bytes(8))
+    monkeypatch.setattr(program, "make_filter", lambda _abi: bytes(8))
     with pytest.raises(program.RouteError, match=r"the kernel refuses a seccomp listener \("):
         start("true")
 

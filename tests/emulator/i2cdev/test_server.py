@@ -12,9 +12,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from cubestack.emulator.i2cdev import running
+from cubestack.emulator.i2cdev import running, server
 from cubestack.emulator.i2cdev.adapter import I2cAdapter
-from cubestack.emulator.i2cdev.server import MAX_CLIENTS, _Client
+from cubestack.emulator.i2cdev.server import _Client
 from cubestack.emulator.ports.endpoint import PortError
 from cubestack.firmware_model.formats import linux_i2c as linux
 
@@ -206,16 +206,42 @@ def test_arbitrary_bytes_do_not_harm_the_server(served, data):
     assert not served.adapter.busy
 
 
-def test_clients_beyond_the_limit_wait_for_a_free_place(served):
-    clients = [served.connect() for _ in range(MAX_CLIENTS + 1)]
-    late = clients[-1]
-    assert served.server.clients == MAX_CLIENTS
-    late.send(linux.Call.IOCTL, SLAVE)
-    served.serve()
-    assert not select.select([late.socket], [], [], 0)[0]
-    clients[0].socket.close()
-    served.serve()
-    assert late.receive() == (0, b"")
+def test_client_beyond_the_limit_of_descriptors_gets_enfile(served, monkeypatch):
+    first = served.connect()
+    monkeypatch.setattr(server, "has_room", lambda _descriptor: False)
+    late = served.connect()
+    assert late.receive() == (-errno.ENFILE, b"")
+    assert late.hung_up()
+    assert served.server.clients == 1
+    monkeypatch.undo()
+    assert served.ask(first, linux.Call.IOCTL, SLAVE) == (0, b"")
+    assert served.ask(served.connect(), linux.Call.IOCTL, SLAVE) == (0, b"")
+
+
+def test_hundreds_of_clients_are_served(served):
+    clients = [served.connect() for _ in range(300)]
+    assert served.server.clients == 300
+    assert served.ask(clients[-1], linux.Call.IOCTL, SLAVE) == (0, b"")
+
+
+@pytest.mark.parametrize(
+    ("flags", "read", "write", "ioctl"),
+    [
+        (os.O_RDWR, 1, 1, 0),
+        (os.O_RDONLY, 1, -errno.EBADF, 0),
+        (os.O_WRONLY, -errno.EBADF, 1, 0),
+        (os.O_ACCMODE, -errno.EBADF, -errno.EBADF, 0),
+        (os.O_PATH, -errno.EBADF, -errno.EBADF, -errno.EBADF),
+    ],
+)
+def test_flags_of_open_decide_which_calls_are_allowed(served, flags, read, write, ioctl):
+    opener, caller = served.connect(), served.connect()
+    body = linux.pack_open(flags | os.O_NONBLOCK)
+    assert served.ask(opener, linux.Call.OPEN, body, key=5) == (0, b"")
+    assert served.ask(caller, linux.Call.MODE, key=5) == (flags, b"")
+    assert served.ask(caller, linux.Call.IOCTL, SLAVE, key=5)[0] == ioctl
+    assert served.ask(caller, linux.Call.WRITE, b"\x41", key=5)[0] == write
+    assert served.ask(caller, linux.Call.READ, linux.pack_read(1), key=5)[0] == read
 
 
 def test_request_wakes_a_waiting_server(served):

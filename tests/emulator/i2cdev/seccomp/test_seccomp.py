@@ -15,19 +15,19 @@ from typing import Any
 import pytest
 
 from cubestack.emulator.i2cdev.seccomp import launcher
-from cubestack.emulator.i2cdev.seccomp.filter import ABIS, ON_DESCRIPTOR, ON_PATH, Abi, make_filter
+from cubestack.emulator.i2cdev.seccomp.abi import ABIS, Abi
+from cubestack.emulator.i2cdev.seccomp.filter import ALWAYS, ON_DESCRIPTOR, ON_PATH, make_filter
 from cubestack.emulator.i2cdev.seccomp.notify import Listener, Notification, read_text
 from cubestack.firmware_model.formats.linux_i2c import Ioctl
 
-NUMBERS = range(960, 1024)
-ALLOW, NOTIFY = 0x7FFF0000, 0x7FC00000
+ALLOW, NOTIFY, NO_SUCH_CALL = 0x7FFF0000, 0x7FC00000, 0x50000 | errno.ENOSYS
 
 
 def decide(abi: Abi, call: int, *arguments: int, arch: int | None = None) -> int:
     """The filter's return value, by the classic BPF instructions that it uses."""
     data = struct.pack("<iIQ", call, abi.audit_arch if arch is None else arch, 0)
     data += struct.pack("<6Q", *(n & (1 << 64) - 1 for n in (*arguments, *[0] * 6)[:6]))
-    program = list(struct.iter_unpack("=HBBI", make_filter(abi, NUMBERS)))
+    program = list(struct.iter_unpack("=HBBI", make_filter(abi)))
     position = accumulator = 0
     while True:
         code, if_true, if_false, operand = program[position]
@@ -53,38 +53,55 @@ def abi(request: pytest.FixtureRequest) -> Abi:
 
 
 def test_filter_notifies_all_calls_with_a_path(abi: Abi):
-    assert len(make_filter(abi, NUMBERS)) // 8 < 255  # jumps fit
-    for name in abi.calls.keys() & set(ON_PATH):
+    assert len(make_filter(abi)) // 8 < 255  # jumps fit
+    for name in abi.calls.keys() & {*ON_PATH, *ALWAYS}:
         assert decide(abi, abi.calls[name], 3, 0x1000) == NOTIFY, name
 
 
-def test_filter_notifies_only_i2c_ioctls(abi: Abi):
-    ours = {int(number) for number in Ioctl}
-    for number in [*range(0x06F0, 0x0740), 0x5401, 0x10703, 0xC0020703]:
+def test_filter_notifies_only_ioctls_of_i2c_and_those_that_only_sockets_have(abi: Abi):
+    ours = {*map(int, Ioctl), 0x541B, 0x5411, 0x5452, *range(0x8900, 0x8A00)}
+    for number in [*range(0x06F0, 0x0740), 0x5401, 0x10703, 0xC0020703, *ours, 0x88FF, 0x8A00]:
         expected = NOTIFY if number in ours else ALLOW
         assert decide(abi, abi.calls["ioctl"], 5, number) == expected, hex(number)
     # Some programs sign-extend the request.
     assert decide(abi, abi.calls["ioctl"], 5, 0xFFFFFFFF_00000703) == NOTIFY
 
 
-@pytest.mark.parametrize("number", [-1, 0, 1, 2, 959, 960, 1000, 1023, 1024, 2**31])
-def test_filter_notifies_calls_on_reserved_descriptors_only(abi: Abi, number: int):
-    expected = NOTIFY if number in NUMBERS else ALLOW
+@pytest.mark.parametrize("number", [-1, 0, 1, 2, 3, 4, 959, 10_000, 2**31 - 1, 2**31])
+def test_filter_notifies_calls_on_all_but_the_standard_streams(abi: Abi, number: int):
+    expected = NOTIFY if 3 <= number < 2**31 else ALLOW
     for name in abi.calls.keys() & set(ON_DESCRIPTOR):
         assert decide(abi, abi.calls[name], number) == expected, name
+    assert decide(abi, abi.calls["epoll_ctl"], 9, 1, number) == expected
+    assert decide(abi, abi.calls["epoll_ctl"], 9, 2, 5) == ALLOW  # EPOLL_CTL_DEL
 
 
-@pytest.mark.parametrize(("command", "sent"), [(0, True), (1030, True), (1, False), (3, False)])
-def test_filter_notifies_fcntl_duplications_only(abi: Abi, command: int, sent: bool):
-    assert decide(abi, abi.calls["fcntl"], 970, command) == (NOTIFY if sent else ALLOW)
-    assert decide(abi, abi.calls["fcntl"], 7, command) == ALLOW
+@pytest.mark.parametrize(
+    ("command", "sent"), [(0, True), (1030, True), (3, True), (1, False), (4, False)]
+)
+def test_filter_notifies_fcntl_of_the_mode_and_duplication_to_standard_streams(
+    abi: Abi, command: int, sent: bool
+):
+    assert decide(abi, abi.calls["fcntl"], 970, command, 0) == (NOTIFY if sent else ALLOW)
+    assert decide(abi, abi.calls["fcntl"], 970, command, 3) == (NOTIFY if command == 3 else ALLOW)
+    assert decide(abi, abi.calls["fcntl"], 1, command) == ALLOW
+
+
+def test_filter_notifies_duplication_onto_standard_streams_only(abi: Abi):
+    for name in abi.calls.keys() & {"dup2", "dup3"}:
+        assert decide(abi, abi.calls[name], 7, 2) == NOTIFY
+        assert decide(abi, abi.calls[name], 7, 3) == ALLOW
+
+
+def test_io_uring_does_not_exist(abi: Abi):
+    assert decide(abi, abi.calls["io_uring_setup"], 8, 0x1000) == NO_SUCH_CALL
 
 
 def test_filter_notifies_newfstatat_with_an_empty_path(abi: Abi):
     call = abi.calls["newfstatat"]
     assert decide(abi, call, 970, 0x1000, 0x2000, 0x1000) == NOTIFY
-    assert decide(abi, call, 7, 0x1000, 0x2000, 0x1000) == ALLOW
-    assert decide(abi, call, 7, 0x1000, 0x2000, 0x100) == NOTIFY  # a path
+    assert decide(abi, call, 1, 0x1000, 0x2000, 0x1000) == ALLOW
+    assert decide(abi, call, 1, 0x1000, 0x2000, 0x100) == NOTIFY  # a path
 
 
 def test_filter_allows_all_other_system_calls(abi: Abi):
@@ -154,18 +171,15 @@ def test_text_that_crosses_into_unmapped_memory_is_rejected(end_of_page: int) ->
 def test_call_fails_with_the_reason_when_its_descriptor_cannot_be_installed(
     monkeypatch: pytest.MonkeyPatch, number: int
 ) -> None:
-    answers: list[tuple[int, ...]] = []
-
-    def ioctl(_fd: int, request: int, argument: object) -> None:
+    def ioctl(_fd: int, request: int, argument: object, _mutate: bool = True) -> None:
         if request & 0xFF == 3:  # SECCOMP_IOCTL_NOTIF_ADDFD
             raise OSError(number, os.strerror(number))
-        if isinstance(argument, bytes):  # struct seccomp_notif_resp: id, val, error, flags
-            answers.append(struct.unpack("=QqiI", argument))
 
     monkeypatch.setattr(fcntl, "ioctl", ioctl)
     call = Notification(7, os.getpid(), 257, (0,) * 6)
-    Listener(-1).answer_with_descriptor(call, 4, 960, close_on_exec=False)
-    assert answers == [(7, 0, -number, 0)]
+    with pytest.raises(OSError, match=r"open files|Bad|limit") as caught:
+        Listener(-1).answer_with_descriptor(call, 4, 960, close_on_exec=False)
+    assert caught.value.errno == (errno.EMFILE if number == errno.EBADF else number)
 
 
 STEPS = bytes(range(1, 25))

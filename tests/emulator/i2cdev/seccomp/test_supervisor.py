@@ -4,7 +4,6 @@ import contextlib
 import ctypes
 import errno
 import os
-import resource
 import stat
 import struct
 from collections.abc import Callable, Iterator
@@ -13,37 +12,16 @@ from typing import Any
 import pytest
 
 from cubestack.emulator.i2cdev.device_node import DeviceNode
-from cubestack.emulator.i2cdev.seccomp import supervisor
-from cubestack.emulator.i2cdev.seccomp.filter import native_abi
+from cubestack.emulator.i2cdev.seccomp import path_calls, supervisor
+from cubestack.emulator.i2cdev.seccomp.abi import native_abi
 from cubestack.emulator.i2cdev.seccomp.notify import Notification
 from cubestack.firmware_model.formats import linux_i2c as linux
-
-
-@pytest.mark.parametrize(
-    ("soft", "first", "end"),
-    [
-        (resource.RLIM_INFINITY, 960, 1024),
-        (1 << 20, 960, 1024),
-        (1025, 960, 1024),
-        (1024, 960, 1024),
-        (1023, 959, 1023),
-        (256, 192, 256),
-        (68, 4, 68),
-        (67, 3, 67),
-        (20, 3, 20),
-    ],
-)
-def test_device_files_get_the_highest_descriptors_usable_by_select(
-    monkeypatch: pytest.MonkeyPatch, soft: int, first: int, end: int
-) -> None:
-    monkeypatch.setattr(resource, "getrlimit", lambda _which: (soft, soft))
-    assert supervisor.descriptor_range() == range(first, end)
 
 
 @pytest.mark.parametrize("value", [0, 1, 3, 100, 2**31 - 1, -1, -100, -(2**31)])
 def test_int_argument_is_taken_from_the_low_32_bits(value: int) -> None:
     for rest in (0, 0xFFFF_FFFF, 0x1234_5678):
-        assert supervisor._signed(rest << 32 | value & 0xFFFF_FFFF) == value
+        assert path_calls.signed(rest << 32 | value & 0xFFFF_FFFF) == value
 
 
 class File:
@@ -52,10 +30,13 @@ class File:
         self.waiting: list[Callable[[bytes], None]] = []
         self.result, self.data, self.closed = 0, b"", False
         self.late = False
+        self.results: list[int] = []  #: of the next calls, instead of ``result``
 
     def perform(self, call: linux.Call, body: bytes, done: Callable[[bytes], None]) -> None:
         self.asked.append((call, body))
-        if self.late:
+        if self.results:
+            done(linux.reply(self.results.pop(0)))
+        elif self.late:
             self.waiting.append(done)
         else:
             done(linux.reply(self.result, self.data))
@@ -94,14 +75,14 @@ class Kernel:
         self.answers[call.id] = result
 
     def answer_with_descriptor(
-        self, call: Notification, fd: int, number: int, *, close_on_exec: bool
+        self, call: Notification, fd: int, number: int | None, *, close_on_exec: bool
     ) -> None:
         self.copies.append(os.dup(fd))
         self.answers[call.id] = number, close_on_exec, self.copies[-1]
 
 
 class Program:
-    def __init__(self, numbers: range = range(900, 904)) -> None:
+    def __init__(self) -> None:
         abi = native_abi()
         assert abi is not None
         self.abi, self.kernel, self.files = abi, Kernel(), list[File]()
@@ -110,13 +91,12 @@ class Program:
             self.kernel,
             abi,
             self.node,
-            numbers,
             self._open,  # type: ignore[arg-type]
         )
         self._kept: list[Any] = []
         self._count = 0
 
-    def _open(self) -> File:
+    def _open(self, _flags: int) -> File:
         self.files.append(File())
         return self.files[-1]
 
@@ -167,9 +147,9 @@ def test_each_open_call_returns_the_device_file(program: Program, name: str, fla
         how = program.memory(struct.pack("=3Q", flags, 0, 0)) if name == "openat2" else flags
         return program(name, *folder, where, how, 24)
 
-    for expected in (900, 900):  # nobody puts it there here, so the number stays free
+    for _ in range(2):
         number, close_on_exec, fd = call(OURS, flags)
-        assert (number, close_on_exec) == (expected, bool(flags & os.O_CLOEXEC))
+        assert (number, close_on_exec) == (None, bool(flags & os.O_CLOEXEC))
         assert stat.S_ISSOCK(os.fstat(fd).st_mode)
     assert len(program.files) == 2
     assert call(OTHER, flags) == "pass"
@@ -181,21 +161,29 @@ def test_each_open_call_returns_the_device_file(program: Program, name: str, fla
 
 
 def test_removed_bus_returns_an_error(program: Program) -> None:
-    def refuse() -> File:
+    def refuse(_flags: int) -> File:
         raise OSError(errno.ECONNREFUSED, "gone")
 
     program.supervisor._files = refuse
     assert program("openat", -100, program.memory(OURS), 0) == -errno.ENODEV
 
 
-def test_open_without_a_free_descriptor_returns_emfile() -> None:
-    taken = os.open("/dev/null", os.O_RDONLY)
-    program = Program(range(taken, taken + 1))
-    try:
-        assert program("openat", -100, program.memory(OURS), 0) == -errno.EMFILE
-    finally:
-        program.close()
-        os.close(taken)
+def test_file_does_not_become_a_standard_stream(
+    program: Program, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real = os.path.lexists
+    monkeypatch.setattr(os.path, "lexists", lambda path: not path.endswith("/0") and real(path))
+    number, *_ = program("openat", -100, program.memory(OURS), os.O_RDWR)
+    assert number >= 3
+    assert number not in {int(name) for name in os.listdir("/proc/self/fd")}
+
+
+def test_open_beyond_the_limit_of_descriptors_returns_enfile(
+    program: Program, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(supervisor, "has_room", lambda _descriptor: False)
+    assert program("openat", -100, program.memory(OURS), 0) == -errno.ENFILE
+    assert program.files[0].closed
 
 
 @pytest.mark.parametrize(
@@ -277,23 +265,55 @@ def test_read_and_write_calls_reach_the_device_file(program: Program) -> None:
     fd = program.opened()
     (file,), place = program.files, program.memory(bytes(8))
     file.result, file.data = 3, b"abc"
-    assert program("read", fd, place, 8) == 3
+    assert program("read", fd, place, 3) == 3
     assert ctypes.string_at(place, 8) == b"abc" + bytes(5)
-    assert program("write", fd, program.memory(b"hello"), 4) == 3
-    parts = struct.pack("=4Q", 1, 0, place, 5)  # the first one is empty
-    assert program("readv", fd, program.memory(parts), 2) == 3
-    assert program("writev", fd, program.memory(parts), 2) == 3
-    assert program("writev", fd, program.memory(parts), 1025) == -errno.EINVAL
+    assert program("write", fd, program.memory(b"hello"), 3) == 3
+    assert program("pread64", fd, place, 3, 99) == 3
+    assert program("pwrite64", fd, place, 3, 99) == 3
+    assert program("pread64", fd, place, 3, -1) == -errno.EINVAL
     assert program("read", fd, 8, 8) == -errno.EFAULT  # where nothing is
     assert program("write", fd, 8, 8) == -errno.EFAULT
-    assert file.asked[:4] == [
-        (linux.Call.READ, linux.pack_read(8)),
-        (linux.Call.WRITE, b"hell"),
-        (linux.Call.READ, linux.pack_read(5)),
-        (linux.Call.WRITE, b"abc\0\0"),
-    ]
+    read, write = (linux.Call.READ, linux.pack_read(3)), (linux.Call.WRITE, b"abc")
+    assert file.asked[:4] == [read, (linux.Call.WRITE, b"hel"), read, write]
     assert program("read", 0, place, 8) == "pass"
     assert program("read", 99_999, place, 8) == "pass"
+
+
+@pytest.mark.parametrize(
+    ("name", "rest"), [("v", ()), ("preadv", (99, 0)), ("preadv2", (-1, 0, 1))]
+)
+def test_parts_of_a_vector_are_calls_of_their_own(
+    program: Program, name: str, rest: tuple[int, ...]
+) -> None:
+    reading, writing = ("readv", "writev") if name == "v" else (name, name.replace("read", "write"))
+    fd = program.opened()
+    (file,), place = program.files, program.memory(b"abcdefgh")
+    parts = program.memory(struct.pack("=8Q", place, 3, 1, 0, place + 3, 5, 1, 0))
+
+    def asked() -> list[tuple[linux.Call, bytes]]:
+        calls, file.asked = file.asked, []
+        return calls
+
+    file.results = [3, 0, 5]  # the empty part at the end is none
+    assert program(writing, fd, parts, 4, *rest) == 8
+    assert asked() == [(linux.Call.WRITE, data) for data in (b"abc", b"", b"defgh")]
+    file.results = [3, 0, 4]
+    assert program(reading, fd, parts, 4, *rest) == 7
+    assert asked() == [(linux.Call.READ, linux.pack_read(count)) for count in (3, 0, 5)]
+    for results, expected, calls in (([2], 2, 1), ([-6], -6, 1), ([3, -6], 3, 2)):
+        file.results = results  # short, failed at once, failed later
+        assert program(writing, fd, parts, 4, *rest) == expected
+        assert len(asked()) == calls
+    assert program(reading, fd, parts, 1025, *rest) == -errno.EINVAL
+    assert program(reading, fd, program.memory(struct.pack("=2Q", 1, 0)), 1, *rest) == 0
+    assert (
+        program(reading, fd, program.memory(struct.pack("=Qq", 1, -1)), 1, *rest) == -errno.EINVAL
+    )
+    if len(rest) > 1:
+        assert program(reading, fd, parts, 4, -2) == -errno.EINVAL
+    if len(rest) > 2:
+        assert program(reading, fd, parts, 4, 0, 0, 8) == -errno.EOPNOTSUPP
+    assert asked() == []
 
 
 def test_late_answers_are_passed_on_unless_the_caller_was_killed(program: Program) -> None:
@@ -311,14 +331,14 @@ def test_late_answers_are_passed_on_unless_the_caller_was_killed(program: Progra
 
 @pytest.mark.parametrize(
     ("name", "arguments", "close_on_exec"),
-    [("dup", (), False), ("fcntl", (0, 5), False), ("fcntl", (1030, 5), True)],
+    [("dup", (), False), ("fcntl", (0, 0), False), ("fcntl", (1030, 0), True)],
 )
 def test_duplicated_descriptor_refers_to_the_same_file(
     program: Program, name: str, arguments: tuple[int, ...], close_on_exec: bool
 ) -> None:
     fd = program.opened()
     number, mode, copy = program(name, fd, *arguments)
-    assert (number, mode) == (900, close_on_exec)
+    assert (number, mode) == (None, close_on_exec)
     assert os.fstat(copy).st_ino == os.fstat(fd).st_ino
     assert program(name, 0, *arguments) == "pass"
     (file,) = program.files
