@@ -7,7 +7,6 @@ from cubestack.firmware_model.interface.pins import Pin, Port
 from cubestack.hdl.user.netlist import Bit, Netlist
 from cubestack.hdl.user.source import GatewareError
 
-
 UNCONNECTED = "leads nowhere on the board"
 """Meaning of an output that the board's pin table does not have."""
 

@@ -139,8 +139,8 @@ def test_file_cut_or_overwritten_anywhere_is_read_or_rejected(text: str, tmp_pat
         path = tmp_path / "damaged"
         path.write_bytes(damaged)
         try:
-            capture = read_capture(path)
+            times, reason = read_capture(path).times, str(path)
         except CaptureError as error:
-            assert str(path) in str(error)
-        else:
-            assert (np.diff(capture.times) >= 0).all()
+            times, reason = np.zeros(0), str(error)
+        assert str(path) in reason
+        assert (np.diff(times) >= 0).all()
