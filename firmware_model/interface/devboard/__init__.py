@@ -5,10 +5,10 @@ are named from the FPGA.
 
 Time. The host owns virtual time; the board has none. A board changes its design's inputs only in
 steps: the inputs of one step change together, the design settles, and the outputs are taken. A
-clock or an asynchronous reset needs a step of its own, after those of the inputs that it samples. The
-host assigns a virtual time to each step and assumes that the outputs changed at that time. Between
-two steps nothing changes, however long the host waits, and it doesn't matter how long the board
-takes. The delays of the FPGA are not visible.
+clock or an asynchronous reset needs a step of its own, after those of the inputs that it samples.
+The host assigns a virtual time to each step and assumes that the outputs changed at that time.
+Between two steps nothing changes, however long the host waits or the board takes. The delays of the
+FPGA are not visible.
 
 Link. Each frame is numbered. A board executes the requests in the order of their numbers, each one
 once. It keeps the latest :data:`RESPONSES` responses: a request that it has executed already is

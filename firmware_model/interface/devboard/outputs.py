@@ -7,14 +7,16 @@ READ; all other outputs are its levels.
 - STEPS: all outputs stay.
 - RUN, STORE and READ: levels are those after the last clock edge of the same direction. Values stay
   at a falling edge, and at a rising one except of the memory that the request names:
-- RUN and STORE: its data output is the camera's data pins before the edge. Its address is
-  incremented if its data output was driven after the last rising edge.
+- RUN and STORE: its address is incremented if its data output was driven after the last rising
+  edge. Its data output takes the level of the camera's data pins before the edge, if it did so at
+  the last rising edge of these operations.
 - READ: its address is incremented by ``step``, and the data output is the memory's data input
   before the edge.
 
 An address wraps at its width. RUN, STORE and READ record the levels after each of their edges,
-those of rising and of falling edges apart. HELLO sets both to its outputs. A deviation is complete:
-after it the host has all outputs again, and the prediction goes on from these.
+those of rising and of falling edges apart. HELLO sets both to its outputs, as if a data output had
+followed its data pins. A deviation is complete: after it the host has all outputs again, and the
+prediction goes on from these.
 
 An operation ends with FULL, unless it is over anyway, after the clock or step whose records leave
 less room below LONGEST_RECORDS than two of the longest ones take.
@@ -89,6 +91,7 @@ class Outputs:
     Attributes:
         now: all outputs, packed.
         after: the levels after the last falling and the last rising edge; values are 0.
+        follows: whether the data output followed the data pins at the last rising edge.
     """
 
     layout: Layout
@@ -102,12 +105,15 @@ class Outputs:
         ports, offsets = self.layout.ports, self.layout.offsets
         self._values = sum((1 << ports[name].width) - 1 << offsets[name] for name in values)
         self.after = [0, 0]
+        self.follows = True
+        self._sampled: tuple[str, int] | None = None
         self.start(self.now)
 
     def start(self, outputs: int) -> None:
         """HELLO returned these outputs."""
         self.now = outputs
         self.after = [outputs & ~self._values] * 2
+        self.follows = True
 
     def predict(self, rising: bool) -> int:
         """The outputs after a falling edge, or a rising one without the memory."""
@@ -119,7 +125,8 @@ class Outputs:
         stored = self.layout.get(self.after[True], ports.drives) & 1
         address = self.layout.get(self.now, ports.address) + stored
         outputs = self.layout.put(self.predict(True), ports.address, address)
-        return self.layout.put(outputs, ports.data_out, pixel)
+        self._sampled = ports.data_out, pixel
+        return self.layout.put(outputs, ports.data_out, pixel) if self.follows else outputs
 
     def predict_read(self, memory: int, step: int, byte: int) -> int:
         """The outputs after a rising edge of READ with ``byte`` on the memory's data input."""
@@ -132,3 +139,7 @@ class Outputs:
         """A clock edge of RUN, STORE or READ had these outputs."""
         self.now = outputs
         self.after[rising] = outputs & ~self._values
+        if rising and self._sampled:
+            name, pixel = self._sampled
+            self.follows = self.layout.get(outputs, name) == pixel
+            self._sampled = None
