@@ -28,6 +28,14 @@ LIMIT_S = 3600
 WARNING = re.compile(r"WARNING +(?! |gpi +vpi_iterate returned NULL)|[Ww]arning:")
 
 
+class Case(NamedTuple):
+    """A cocotb test that ran; ``error`` is empty if it passed."""
+
+    name: str
+    error: str
+    seconds: float
+
+
 class Outcome(NamedTuple):
     """How a simulation ended: the cocotb tests that ran and failed, its log and its duration.
 
@@ -41,6 +49,7 @@ class Outcome(NamedTuple):
     log: str = ""
     seconds: float = 0.0
     error: str = ""
+    cases: tuple[Case, ...] = ()
 
     @property
     def passed(self) -> bool:
@@ -114,11 +123,13 @@ def simulate(
     limit_s: int = LIMIT_S,
     failures: int = 0,
     only: str = "",
+    matching: str = "",
     waveform: Path | None = None,
 ) -> Outcome:
     """Run cocotb ``modules`` on what :func:`build` made; the same seed gives the same run.
 
-    Stops after ``failures`` failures unless that is 0; runs but one test with ``only``. Writes all
+    Stops after ``failures`` failures unless that is 0; runs but one test with ``only``, and
+    those whose full name the pattern ``matching`` fits. Writes all
     signals to the VCD file ``waveform`` when the design was built as traced. The modules are found
     in the folders ``path``, and read ``settings`` from the environment.
     """
@@ -140,6 +151,7 @@ def simulate(
             seed=seed,
             plusargs=[f"+seed={seed}", *[f"+dumpfile_path={waveform}"] * bool(waveform)],
             testcase=only or None,
+            test_filter=matching or None,
             waves=waveform is not None,
             test_dir=folder,
             results_xml=str(results.resolve()),
@@ -204,4 +216,15 @@ def _outcome(
             problem = f"no test ran in {sorted(set(modules) - found)}"
         elif warned := [line for line in text.splitlines() if WARNING.search(line)]:
             problem = "\n".join(warned)
-    return Outcome(ran, failed, problem, text, seconds, "".join(errors[:1]))
+    done = tuple(
+        Case(str(case.get("name")), _error(case), float(case.get("time") or 0)) for case in cases
+    )
+    return Outcome(ran, failed, problem, text, seconds, "".join(errors[:1]), done)
+
+
+def _error(case: ElementTree.Element) -> str:
+    """In one line; empty if the test passed."""
+    for kind in ("failure", "error", "skipped"):
+        if (part := case.find(kind)) is not None:
+            return " ".join(str(part.get("message") or kind).split())
+    return ""

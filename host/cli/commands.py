@@ -54,7 +54,11 @@ BUILT_IN = {
         (EMULATOR, "export", "write the interface for C, Python, XTCE, COSMOS, Wireshark, SVD"),
         (EMULATOR, "conformance", "check a device's protocol against the tables"),
         (EMULATOR, "ground", "open a page in the browser that shows and commands a device"),
-        (EMULATOR, "hdl", "FPGA designs: area, Verilog files, proofs, waveforms of failed tests"),
+        (
+            EMULATOR,
+            "hdl",
+            "FPGA designs: area, Verilog files, proofs, tests of your own, waveforms",
+        ),
         (TOOLS, "replay", "play a recording to an emulated device and compare its answers"),
         (TOOLS, "decode", "list the messages of a recording, or write them as a table"),
         (TOOLS, "new-sensor", "write a sensor of your own: messages, firmware, board, tests"),

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from cubestack.emulator.boards.contract import Board
     from cubestack.emulator.scene.form import SceneForm
     from cubestack.firmware_model.interface.efm32gg.table import Processor
+    from cubestack.hdl.contract.contract import Contract
     from cubestack.hdl.flow.top import TopTable
     from cubestack.hdl.proofs.prover import Proof
     from cubestack.host.devices.experiment import AnyExperiment
@@ -177,6 +178,7 @@ class Device(Generic[BoardT_co, ClientT_co]):
             what it expects.
         tops: tops of its FPGAs, and blocks, by name, as ``hdl.flow`` takes them.
         proofs: formal properties of them by name.
+        contract: what it requires of a design for its FPGA; None where nothing is declared.
         prepare: makes what takes seconds the first time, such as a catalogue; it is given what
             shows progress: (items, total, label) -> the items. ``open_board`` makes it silently.
         conformance: what the protocol suite must know of it beside its tables.
@@ -204,6 +206,7 @@ class Device(Generic[BoardT_co, ClientT_co]):
     studies: Mapping[str, Callable[[], Any]] = field(default_factory=dict)
     tops: "Callable[[], TopTable]" = dict
     proofs: "Callable[[], Mapping[str, Proof]]" = dict
+    contract: "Callable[[], Contract] | None" = None
     prepare: Callable[[Shown], None] = lambda _shown: None
     conformance: ConformanceNotes = field(default_factory=ConformanceNotes)
     processor: "Callable[[], Processor] | None" = None

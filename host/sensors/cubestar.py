@@ -191,6 +191,7 @@ DEVICE: "Device[CubeStarStack, CubeStar]" = Device(
     processor=get("cubestack.firmware_model.interface.cubestar.processor_pins:PROCESSOR"),
     tops=get("cubestack.hdl.cubestar.tops:TOPS"),
     proofs=get("cubestack.hdl.proofs.cubestar:PROOFS"),
+    contract=get("cubestack.hdl.contract.cubestar.declared:CONTRACT"),
     image_sensor=REGISTERS,
     conformance=ConformanceNotes(
         effects={

@@ -27,6 +27,7 @@ class Sram:
         """On the pins that begin with ``prefix``; ``clock`` is the level of the writing one."""
         self._pins = {name: getattr(dut, f"{prefix}{name}") for name in (*OUTPUTS, "D_I")}
         self._pins["D_I"].value = 0
+        self._prefix = prefix
         self._clock = clock
         self.memory = bytearray(random.randbytes(2 * GEOMETRY.bank_size))
         self.access = random.randrange(1, SLOWEST_ACCESS)
@@ -46,7 +47,9 @@ class Sram:
         return bytes(self.memory[address] for address in GEOMETRY.addresses(bank))
 
     def _level(self, name: str) -> int:
-        return int(self._pins[name].value)
+        value = self._pins[name].value
+        assert value.is_resolvable, f"{self._prefix}{name} is {value}"
+        return int(value)
 
     async def _count_edges(self) -> None:
         while True:

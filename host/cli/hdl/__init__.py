@@ -1,5 +1,5 @@
-"""FPGA designs: area, Verilog for other tools, formal proofs, waveforms of failed
-tests.
+"""FPGA designs: area, Verilog for other tools, formal proofs, tests of a design of
+yours, waveforms of failed tests.
 
 examples:
   cubestack hdl area
@@ -7,6 +7,7 @@ examples:
   cubestack hdl verilog TOP --out top.v
   cubestack hdl verilog TOP | yosys -f verilog -p 'synth_ice40' -
   cubestack hdl prove sun-scan
+  cubestack hdl test design.v --device cubestar
   cubestack hdl wave whole_frame
 """
 
@@ -16,12 +17,12 @@ from collections.abc import Callable, Mapping
 from cubestack.hdl.flow.top import TopTable
 from cubestack.hdl.proofs.prover import Proof
 from cubestack.host.cli.arguments import Parser
-from cubestack.host.cli.hdl import area, compare, prove, verilog, wave
+from cubestack.host.cli.hdl import area, compare, prove, test, verilog, wave
 from cubestack.host.devices.registry import merged_tables
 
 #: One module per action, in the order of the help. Each has NAME, HELP, DESCRIPTION,
 #: ``add_arguments`` and ``run``.
-ACTIONS = (area, verilog, prove, wave, compare)
+ACTIONS = (area, verilog, prove, test, wave, compare)
 
 
 def _all_tops() -> TopTable:

@@ -1,18 +1,14 @@
 """Functional coverage: all points that the regression has to reach, declared once.
 
-A :class:`Group` is a table of points, one for each combination of its axes that can happen. Rows of
-commands come from the interface tables. Benches :func:`hit` points in whatever process they run;
-each process notes its own in a file of the folder that ``HDL_COVERAGE`` names, or nowhere.
+Rows of commands come from the interface tables.
 """
 
-import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator
 from itertools import product
-from pathlib import Path
 
 from cubestack.firmware_model.interface.cubesense import fpga
 from cubestack.firmware_model.interface.cubesense.fpga import COMMANDS, Action, FpgaCommand
+from cubestack.hdl.contract.points import Coverage, Group
 
 #: What a writer can be doing when it is stopped. "Reset" is the two clocks after it was started.
 STORE_STATES = (
@@ -55,7 +51,6 @@ CUBESTAR = {
 PAIRS = {"CubeSensePair": "pair", "addressable": "addressing"}
 TOPS = CUBESTAR | PAIRS
 SIDES = ("sun", "nadir")
-Point = tuple[str, ...]
 
 
 def name_of(command: FpgaCommand) -> str:
@@ -83,26 +78,6 @@ def states_of(side: str, action: Action) -> tuple[str, ...]:
         Action.READ_FROM: READ_FROM_STATES,
         Action.STANDBY: (),
     }[action]
-
-
-@dataclass(frozen=True)
-class Group:
-    """Points of one kind; ``meaning`` is what a point is.
-
-    ``axes`` are the names of its parts, and what each can be; ``possible`` returns whether a
-    combination, given by these names, can happen at all.
-    """
-
-    meaning: str
-    axes: Mapping[str, Iterable[object]]
-    possible: Callable[..., bool] = lambda **_: True
-
-    def points(self) -> list[Point]:
-        return [
-            tuple(map(str, parts))
-            for parts in product(*self.axes.values())
-            if self.possible(**dict(zip(self.axes, parts, strict=True)))
-        ]
 
 
 def _rows(mcu_addressing: bool) -> Iterator[str]:
@@ -232,47 +207,5 @@ GROUPS = {
     ),
 }
 
-
-_noted: set[tuple[str, Point]] = set()  #: Points that this process noted
-
-_POINTS = {name: frozenset(group.points()) for name, group in GROUPS.items()}
-
-
-def hit(group: str, **parts: object) -> None:
-    """Record a reached point; raises ValueError when it is not declared."""
-    names = tuple(GROUPS[group].axes)
-    if set(parts) != set(names):
-        raise ValueError(f"a point of {group!r} has {', '.join(names)}, not {', '.join(parts)}")
-    point = tuple(str(parts[name]) for name in names)
-    if point not in _POINTS[group]:
-        raise ValueError(f"{' / '.join(point)} is no declared point of {group!r}")
-    folder = os.environ.get("HDL_COVERAGE")
-    if not folder or (group, point) in _noted:
-        return
-    _noted.add((group, point))
-    with (Path(folder) / f"{os.getpid()}.txt").open("a", encoding="utf-8") as file:
-        file.write("\t".join([group, *point]) + "\n")
-
-
-def merged(folder: Path) -> dict[str, set[Point]]:
-    found: dict[str, set[Point]] = {name: set() for name in GROUPS}
-    for path in folder.glob("*.txt"):
-        for line in path.read_text(encoding="utf-8").splitlines():
-            group, *point = line.split("\t")
-            found[group].add(tuple(point))
-    return found
-
-
-def missed(found: Mapping[str, set[Point]]) -> list[tuple[str, Point]]:
-    return [(name, p) for name, g in GROUPS.items() for p in g.points() if p not in found[name]]
-
-
-def table(found: Mapping[str, set[Point]], most: int = 40) -> Iterator[str]:
-    for name, points in _POINTS.items():
-        yield f"{name:<18} {len(found[name]):>5} of {len(points):>5}  {GROUPS[name].meaning}"
-    wanting = missed(found)
-    for name, point in wanting[:most]:
-        parts = zip(GROUPS[name].axes, point, strict=True)
-        yield f"not reached: {name}: {', '.join(f'{axis} {part!r}' for axis, part in parts)}"
-    if len(wanting) > most:
-        yield f"not reached: {len(wanting) - most} more"
+COVERAGE = Coverage(GROUPS)
+hit, merged, missed, table = COVERAGE.hit, COVERAGE.merged, COVERAGE.missed, COVERAGE.table

@@ -19,7 +19,7 @@ BOARD = "PublishedTestbench"
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("HDL_COVERAGE", str(tmp_path))
-    monkeypatch.setattr(points, "_noted", set())
+    points.COVERAGE.forget()
     return tmp_path
 
 

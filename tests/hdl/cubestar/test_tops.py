@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from cubestack.firmware_model.interface.cubestar.pins import HEADER, PUBLISHED
+from cubestack.hdl.contract.cubestar.declared import FULL_FRAME
 from cubestack.hdl.cubestar.top import CubeStarTop
 from cubestack.hdl.flow.generate import verilog_text
 from tests.hdl.cubestar.as_published import AsPublished, DoubleAsPublished, SharedAsPublished
@@ -38,8 +39,7 @@ def test_published_needs_no_initial_values(icarus: Any, seed: int) -> None:
 
 @pytest.mark.slow
 def test_store_and_read_of_a_full_frame_pass_the_testbench(icarus: Any) -> None:
-    harness = Path(__file__).with_name("full_frame.v")
-    icarus.run(CubeStarTop, 1024, 512, *modules(STAR, "full_frame"), seed=1, harness=harness)
+    icarus.run(CubeStarTop, 1024, 512, *modules(STAR, "full_frame"), seed=1, harness=FULL_FRAME)
 
 
 def test_published_gateware_passes_the_border_testbench(icarus: Any) -> None:

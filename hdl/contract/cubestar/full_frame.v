@@ -6,6 +6,8 @@
 module full_frame;
     parameter COLUMNS = 1024;
     parameter ROWS = 512;
+    parameter PAUSE = 1;  // least number of clocks between two rows
+    parameter HIGH_WRITES = 0;  // a write pulse may begin while PIXCLK is high
     localparam PIXELS = COLUMNS * ROWS;
     localparam COLUMN_BITS = $clog2(COLUMNS);
     localparam POSITION_BITS = COLUMN_BITS + $clog2(ROWS);
@@ -61,7 +63,7 @@ module full_frame;
                 column = column + 1;
                 if (column == COLUMNS) begin
                     column = 0;
-                    blank = 1 + $unsigned($random(seed)) % 20;
+                    blank = PAUSE + $unsigned($random(seed)) % 20;
                     row = row + 1;
                     if (row == ROWS) begin
                         row = 0;
@@ -78,11 +80,21 @@ module full_frame;
     time pulse_end = 0;
     reg bank_wanted = 0;
     always @(posedge VSYNC) if (!ACK) pulses = 0;
-    always @(negedge SRAM_WE_N) if (PIXCLK !== 0) unstable = unstable + 1;
-    always @(SRAM_A or bus) if (SRAM_WE_N === 0 && SRAM_CE_N === 0) unstable = unstable + 1;
+    always @(negedge SRAM_WE_N) if (!HIGH_WRITES && PIXCLK !== 0) unstable = unstable + 1;
+    // What the pins have settled at a picosecond after a change; a pulse may end with it.
+    reg [POSITION_BITS:0] written_at;
+    reg [7:0] written;
+    time pulse_start = 0;
+    always @(negedge SRAM_WE_N) pulse_start = $time;
+    always @(SRAM_A or bus or SRAM_WE_N) #1 if (SRAM_WE_N === 0 && SRAM_CE_N === 0) begin
+        if ($time - 1 > pulse_start && {written_at, written} !== {SRAM_A, bus})
+            unstable = unstable + 1;
+        written_at = SRAM_A;
+        written = bus;
+    end
     always @(posedge SRAM_WE_N) if (SRAM_CE_N === 0) begin
-        memory[SRAM_A] = bus;
-        if (SRAM_A !== {bank_wanted, pulses[POSITION_BITS - 1:0]}) disorder = disorder + 1;
+        memory[written_at] = written;
+        if (written_at !== {bank_wanted, pulses[POSITION_BITS - 1:0]}) disorder = disorder + 1;
         pulses = pulses + 1;
         pulse_end = $time;
     end

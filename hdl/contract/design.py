@@ -1,0 +1,50 @@
+"""A design that is checked against a contract: the user's, or the shipped one."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from cubestack.hdl.blocks.pinned import PinnedComponent
+from cubestack.hdl.contract.contract import Contract, Size
+from cubestack.hdl.user import GatewareError, load_gateware
+
+
+@dataclass(frozen=True)
+class Design:
+    """``text`` as for ``hdl.user.load_gateware``; the shipped design without one."""
+
+    contract: Contract
+    text: str = ""
+    parameters: Mapping[str, int | str] | None = None
+    folder: Path | None = None
+
+    @property
+    def title(self) -> str:
+        return self.text or f"{self.contract.title} as shipped"
+
+    def make(self, size: Size) -> PinnedComponent:
+        """The design for images of this size; raises GatewareError, one line for each reason.
+
+        Every size but the full one is set by the contract's parameters.
+        """
+        if not self.text:
+            return self.contract.shipped(size)
+        given = dict(self.parameters or {})
+        if size != self.contract.full:
+            given |= self.contract.parameters(size)
+        return load_gateware(self.text, self.contract.pins(size), given, self.folder)
+
+    @cached_property
+    def sized(self) -> bool:
+        """Whether it has parameters for the image's size, and pins that follow them."""
+        if not self.text:
+            return True
+        if {*self.contract.parameters(self.contract.full)} & {*(self.parameters or {})}:
+            return False
+        try:
+            self.make(self.contract.proof)
+        except GatewareError:
+            self.make(self.contract.full)  # the reason that counts, if there is one
+            return False
+        return True

@@ -1,0 +1,47 @@
+"""Options of the actions that check a design against a device's contract."""
+
+import argparse
+
+from cubestack.hdl.contract.contract import Contract
+from cubestack.hdl.contract.design import Design
+from cubestack.host.devices.registry import device, devices
+
+FILE = "design.v[:TOP], files with commas, a folder, a list of files, or MODULE:CLASS"
+
+
+def add_design(parser: argparse.ArgumentParser) -> None:
+    """The device and the design's parameters; FILE is each action's own."""
+    parser.add_argument("--device", metavar="DEVICE", help="whose FPGA the design is for")
+    parser.add_argument(
+        "--gateware-param",
+        metavar="NAME=VALUE",
+        action="append",
+        default=[],
+        help="a parameter of the design; may be repeated",
+    )
+
+
+def design_of(args: argparse.Namespace, text: str) -> Design:
+    """The design that is checked; ValueError for a device without a contract."""
+    return Design(_contract(args.device), text, dict(map(_parameter, args.gateware_param)))
+
+
+def _contract(name: str | None) -> Contract:
+    with_one = [one for one in devices() if one.contract is not None]
+    names = ", ".join(one.name for one in with_one)
+    if name is None:
+        raise ValueError(f"say whose FPGA the design is for: --device with one of {names}")
+    found = device(name).contract
+    if found is None:
+        raise ValueError(f"{name} declares no contract for its FPGA; devices with one: {names}")
+    return found()
+
+
+def _parameter(text: str) -> tuple[str, int | str]:
+    name, equals, value = text.partition("=")
+    if not equals or not name.isidentifier():
+        raise ValueError(f"--gateware-param takes NAME=VALUE, not {text!r}")
+    try:
+        return name, int(value, 0)
+    except ValueError:
+        return name, value
