@@ -7,7 +7,17 @@ from pathlib import Path
 
 from cubestack.hdl.blocks.pinned import PinnedComponent
 from cubestack.hdl.contract.contract import Contract, Size
+from cubestack.hdl.flow.generate import rtlil_text, verilog_text
+from cubestack.hdl.flow.tools import yosys_files
 from cubestack.hdl.user import GatewareError, load_gateware
+
+_VERILOG = """
+read_rtlil dut.il
+proc
+memory_collect
+pmuxtree
+write_verilog -noattr dut.v
+"""
 
 
 @dataclass(frozen=True)
@@ -34,6 +44,13 @@ class Design:
         if size != self.contract.full:
             given |= self.contract.parameters(size)
         return load_gateware(self.text, self.contract.pins(size), given, self.folder)
+
+    def verilog(self, size: Size) -> str:
+        """For a simulator; its module is "dut"."""
+        made = self.make(size)
+        if not self.text:
+            return verilog_text(made, "dut")
+        return yosys_files(_VERILOG, {"dut.il": rtlil_text(made, "dut")}, "dut.v")[1]
 
     @cached_property
     def sized(self) -> bool:

@@ -16,7 +16,6 @@ from xml.etree import ElementTree
 from cubestack.hdl.contract.contract import FULL, QUICK, Check, Contract, Size
 from cubestack.hdl.contract.design import Design
 from cubestack.hdl.contract.points import Coverage, Point
-from cubestack.hdl.flow.generate import verilog_text
 from cubestack.hdl.flow.tools import ToolError, ToolMissingError
 
 if TYPE_CHECKING:
@@ -125,12 +124,16 @@ def run_checks(
         bench = _Bench(design, folder, simulator)
         total = sum(len(run.checks) for run in runs)
         for run in runs:
-            done = len(report.results)
-            report.results += bench.results(run, lambda n, d, done=done: told(n, done + d, total))
+            report.results += bench.results(run, _after(told, len(report.results), total))
         report.reached = Coverage(design.contract.points).merged(folder / "points")
         if report.failed:
             report.waveform = bench.waveform(report.failed[0], runs, waves)
     return report
+
+
+def _after(told: Told, before: int, total: int) -> Callable[[str, int], None]:
+    """Tells of one simulation's tests, of which ``before`` are over."""
+    return lambda name, done: told(name, before + done, total)
 
 
 def check_tools(simulator: str) -> None:
@@ -173,7 +176,7 @@ class _Bench:
         self._runs += 1
         folder = self._folder / str(self._runs)
         folder.mkdir()
-        (folder / "dut.v").write_text(verilog_text(self._design.make(run.size), "dut"), "utf-8")
+        (folder / "dut.v").write_text(self._design.verilog(run.size), "utf-8")
         size = {"COLUMNS": run.size.columns, "ROWS": run.size.rows}
         try:
             runner = simulator.build(
@@ -187,7 +190,9 @@ class _Bench:
                 simulator=self._simulator,
             )
         except (RuntimeError, SystemExit) as error:
-            raise ToolError(f"{self._simulator} does not compile the design: {error}") from None
+            log = simulator.text_of(folder / "build" / "build.log").strip() or str(error)
+            text = log.replace(f"{folder}/", "").splitlines()[0]
+            raise ToolError(f"{self._simulator} does not compile the design: {text}") from None
         noted = folder / "progress"
         noted.touch()
         with ThreadPoolExecutor(1) as pool:
@@ -202,6 +207,7 @@ class _Bench:
                     **simulator.frame_environment(*run.size),
                     "HDL_COVERAGE": "" if waveform else str(self._folder / "points"),
                     "CONTRACT_PROGRESS": str(noted),
+                    "COCOTB_REWRITE_ASSERTION_FILES": "",  # an error is the requirement in words
                 },
                 simulator=self._simulator,
                 limit_s=LIMIT_S,

@@ -91,7 +91,7 @@ class ContractBench(CubeStarBench):
 
     @property
     def mode(self) -> str:
-        """What the design has been told to do; "changing" within the latency of a change."""
+        """What ENABLE and RNW request; "changing" within the latency of a change."""
         last = self.mcu.controls[-1]
         if now() - last.time < LATENCY * self.camera.period:
             return "changing"

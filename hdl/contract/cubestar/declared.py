@@ -2,7 +2,9 @@
 
 from pathlib import Path
 
-from cubestack.firmware_model.interface.pins import Pin
+from cubestack.firmware_model.interface.cubestar.pins import PUBLISHED
+from cubestack.firmware_model.interface.pins import Pin, resized
+from cubestack.hdl.blocks.counters import MatrixCounter
 from cubestack.hdl.contract.contract import FULL, QUICK, Check, Contract, Size
 from cubestack.hdl.contract.cubestar.points import POINTS
 from cubestack.hdl.cubestar.top import CubeStarTop
@@ -52,7 +54,7 @@ CHECKS = {
 
 
 def _pins(size: Size) -> tuple[Pin, ...]:
-    return CubeStarTop(*size).pins
+    return resized(PUBLISHED, SRAM_A=MatrixCounter.address_width(*size) + 1)
 
 
 CONTRACT = Contract(

@@ -7,7 +7,7 @@ examples:
   cubestack hdl verilog TOP --out top.v
   cubestack hdl verilog TOP | yosys -f verilog -p 'synth_ice40' -
   cubestack hdl prove sun-scan
-  cubestack hdl test design.v --device cubestar
+  cubestack hdl test design.v --device DEVICE
   cubestack hdl wave whole_frame
 """
 

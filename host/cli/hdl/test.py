@@ -30,10 +30,10 @@ others at full size, which takes about a minute.
 Exit status 1 if a test fails; the waveform of the first failure is kept.
 
 examples:
-  cubestack hdl test design.v --device cubestar
-  cubestack hdl test design.v:my_top --device cubestar --tier full --seed 7
-  cubestack hdl test my_module:MyTop --device cubestar -k bank
-  cubestack hdl test --device cubestar --junit out/contract.xml"""
+  cubestack hdl test design.v --device DEVICE
+  cubestack hdl test design.v:my_top --device DEVICE --tier full --seed 7
+  cubestack hdl test my_module:MyTop --device DEVICE -k bank
+  cubestack hdl test --device DEVICE --junit out/contract.xml"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
