@@ -132,7 +132,7 @@ def run_checks(
 
 
 def _after(told: Told, before: int, total: int) -> Callable[[str, int], None]:
-    """Tells of one simulation's tests, of which ``before`` are over."""
+    """Progress of one simulation, before which ``before`` tests are over."""
     return lambda name, done: told(name, before + done, total)
 
 
