@@ -17,6 +17,7 @@ class HostLine:
         uart: the device's end; write to it directly.
         framing_errors: number of characters with a low stop bit.
         parity_errors: number of characters with a wrong parity bit.
+        breaks: number of characters that are low from start to stop bit.
     """
 
     def __init__(self, uart: Uart) -> None:
@@ -24,7 +25,7 @@ class HostLine:
         self.uart = uart
         self._blocks: deque[tuple[bytes, int, int]] = deque()
         self._sampler: LineSampler | None = None
-        self.framing_errors = self.parity_errors = 0
+        self.framing_errors = self.parity_errors = self.breaks = 0
         uart.line = self._deliver
         uart.host_form = uart.form
 
@@ -96,6 +97,7 @@ class HostLine:
             self._blocks.append((bytes([character.value]), character.time_ps, 1))
             self.framing_errors += character.framing_error
             self.parity_errors += character.parity_error
+            self.breaks += character.framing_error and not character.value
 
 
 class DirectSerial:

@@ -22,6 +22,7 @@ from pathlib import Path
 from cubestack.emulator.bus.line_format import FASTEST_BAUD, LineFormat, Parity
 from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.ports.endpoint import PortError, poll_now
+from cubestack.emulator.ports.openings import Openings
 from cubestack.emulator.ports.serial_port import SerialPort
 
 _TERMIOS2 = struct.Struct("=4IB19s2I")  # i, o, c, l flags; line; control characters; rates
@@ -59,10 +60,10 @@ class PtyEndpoint(SerialPort):
     """A pseudo-terminal whose slave is reachable under a symbolic link.
 
     A client is connected while any program has the slave open. When the last one closes it, unread
-    bytes are dropped, raw mode is restored and exclusive use ends, so the next client finds a fresh
-    port. Bytes from the device are dropped while there is no client. The scheduler notices the end
-    of a client at once and its beginning at the next exchange; a client that closes and reopens the
-    terminal before that counts as one.
+    bytes are dropped, raw mode is restored, and exclusive use and stopped output end, so the next
+    client finds a fresh port, even if it opens the terminal at once. Settings that it has then are
+    its own unless they equal its predecessor's. Bytes from the device are dropped while there is no
+    client.
 
     Bits have no duration on a pseudo-terminal, so bytes arrive intact whatever baud rate, parity
     and stop bits a client sets; a format that differs from the device's is reported once per
@@ -98,29 +99,57 @@ class PtyEndpoint(SerialPort):
             os.close(self._master)
             raise PortError(f"can not create the link {path}: {error.strerror}") from error
         self._connected = False
+        self._client = object()
+        self._seen = self._raw
+        self._openings = _watch(self._terminal)
+        self._ended = False
         super().__init__(uart)
 
     def watched(self) -> list[tuple[int, int]]:
-        """Nothing without a client, as a hung-up master is always ready."""
-        return [(self._master, self._events(reading=True))] if self._connected else []
+        """Without a client not the master, as a hung-up one is always ready."""
+        watched = [(self._openings.fd, select.POLLIN)] if self._openings else []
+        if self._connected:
+            watched.append((self._master, self._events(reading=True)))
+        return watched
+
+    def exchange(self, now_ps: int) -> None:
+        """Also notices a client that has followed another one since the last exchange."""
+        self._notice()
+        if self._ended and not self._hung_up():
+            self._ended = False
+            self._renew(keep=read_settings(self._master) != self._seen)
+        super().exchange(now_ps)
+
+    def _notice(self) -> None:
+        if self._openings and self._openings.ended():
+            self._ended = True
 
     def close(self) -> None:
         """Remove the terminal, and the link if it still leads there."""
         super().close()
+        if self._openings:
+            self._openings.close()
         with contextlib.suppress(OSError):
             if self._path.readlink() == Path(self._terminal):
                 self._path.unlink()
         os.close(self._master)
 
+    def _hung_up(self) -> bool:
+        return bool(poll_now(self._master, 0) & select.POLLHUP)
+
     def _find_client(self) -> object | None:
-        hung_up = poll_now(self._master, 0) & select.POLLHUP
+        hung_up = self._hung_up()
+        settings = read_settings(self._master)
         # A client may come and go between two exchanges, and leave other settings.
-        if hung_up and (self._connected or read_settings(self._master) != self._raw):
+        if hung_up and (self._connected or self._ended or settings != self._raw):
+            self._ended = False
             self._renew()
+        else:
+            self._seen = settings
         self._connected = not hung_up
         if self._strict:
             self._apply_format(reported=True)
-        return self._master if self._connected else None
+        return self._client if self._connected else None
 
     def _read(self, max_bytes: int) -> bytes:
         try:
@@ -150,27 +179,47 @@ class PtyEndpoint(SerialPort):
             self._report(f"{self.name}: a client has set {form}, the device has {device}: {effect}")
             self._reported = True
 
-    def _renew(self) -> None:
+    def _renew(self, *, keep: bool = False) -> None:
+        """Begin with another client; ``keep`` the settings, which it has made already."""
         self._reported = False
+        self._client = object()
+        own = self._openings.own() if self._openings else contextlib.nullcontext()
         try:
             slave = os.open(self._terminal, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         except OSError:
             # Locked by TIOCEXCL, which outlives its client: a new terminal is needed.
             self._replace()
             return
-        fcntl.ioctl(slave, termios.TIOCNXCL)
-        write_settings(slave, self._raw)
-        termios.tcflush(slave, termios.TCIFLUSH)
-        os.close(slave)
+        with own:
+            fcntl.ioctl(slave, termios.TIOCNXCL)
+            termios.tcflow(slave, termios.TCOON)
+            if not keep:
+                write_settings(slave, self._raw)
+            termios.tcflush(slave, termios.TCIFLUSH)
+            os.close(slave)
+        self._notice()  # takes the events of this opening
+        self._seen = self._raw
 
     def _replace(self) -> None:
         master, self._terminal = _open_terminal(self._baud)
         os.dup2(master, self._master, inheritable=False)
         os.close(master)
+        if self._openings:
+            self._openings.close()
+        self._openings = _watch(self._terminal)
+        self._seen = self._raw
         new_link = self._path.with_name(f".{self._path.name}.new")
         new_link.unlink(missing_ok=True)
         new_link.symlink_to(self._terminal)
         new_link.replace(self._path)
+
+
+def _watch(terminal: str) -> Openings | None:
+    """None where it can't be watched: a client that follows another at once is then the same."""
+    try:
+        return Openings(terminal)
+    except OSError:
+        return None
 
 
 def _open_terminal(baud: int) -> tuple[int, str]:

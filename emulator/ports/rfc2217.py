@@ -1,24 +1,19 @@
-"""A serial port on TCP whose client chooses baud rate and format: RFC 2217, through pyserial.
+"""A serial port on TCP whose client chooses baud rate and format: RFC 2217.
 
 The device's end keeps its format. If a client chooses another one, bytes are garbled in both
 directions, as on a real line (``emulator.bus.line_format``). The client receives bytes with errors
-as decoded, like those of Linux's serial drivers, and a notification if it requested line states.
-The default format is the device's. Flow control and modem lines are accepted without effect, as the
-line has neither.
+as decoded, like those of Linux's serial drivers, and notifications of the states of line and modem
+that it requested. The default format is the device's. ``com_port`` has the commands.
 """
 
 import select
-import struct
-from collections.abc import Callable
-from dataclasses import dataclass
-from types import SimpleNamespace
-from typing import Any
 
-from serial.rfc2217 import IAC, IAC_DOUBLED, SERVER_NOTIFY_LINESTATE, PortManager
+from serial.rfc2217 import IAC, IAC_DOUBLED
 
 from cubestack.emulator.bus.line_format import LineFormat
 from cubestack.emulator.bus.uart import Uart
-from cubestack.emulator.ports.line import HostLine
+from cubestack.emulator.ports import com_port
+from cubestack.emulator.ports.com_port import ComPort
 from cubestack.emulator.ports.tcp import TcpEndpoint
 
 CHUNK_BYTES = 4096
@@ -26,9 +21,6 @@ CHUNK_BYTES = 4096
 
 MAX_SUBOPTION = 512
 """Limit of the bytes between IAC SB and IAC SE; RFC 2217 needs a little over 255."""
-
-FRAMING_ERROR, PARITY_ERROR = 8, 4
-"""Bits of NOTIFY-LINESTATE, RFC 2217 section 3."""
 
 
 class Rfc2217Endpoint(TcpEndpoint):
@@ -41,23 +33,47 @@ class Rfc2217Endpoint(TcpEndpoint):
         self._device_form = uart.form
         self._written = bytearray()
         self._replies = bytearray()
-        self._manager: Any = None
+        self._manager: ComPort | None = None
+        self._idle = True
+        self._overruns = 0
+        self._arrived = False
         self._now_ps = 0
         super().__init__(host, port, uart, allow_remote=allow_remote)
 
     def exchange(self, now_ps: int) -> None:
-        """Also notifies the client of errors on the line, and sends pending replies."""
+        """Also notifies the client of states of the line, and sends pending replies."""
         self._now_ps = now_ps
-        errors = self._line.framing_errors, self._line.parity_errors
+        errors = self._line.framing_errors, self._line.parity_errors, self._line.breaks
         super().exchange(now_ps)
         if self._manager is not None:
-            self._notify_errors(*errors)
+            self._notify(*errors)
+            self._flush()
+
+    def pull(self) -> None:
+        super().pull()
+        self._check_modem_lines()
+
+    def plug(self, uart: Uart) -> None:
+        super().plug(uart)
+        self._check_modem_lines()
+
+    def _check_modem_lines(self) -> None:
+        if self._manager is not None:
+            self._manager.check_modem_lines()
             self._flush()
 
     def _welcome(self) -> None:
         self._line.form = self._device_form
-        settings = _Settings(self._line, self._change_form, self._purge, self._drop_writes)
-        self._manager = PortManager(settings, SimpleNamespace(write=self._replies.extend))
+        settings = com_port.Settings(
+            form_of=lambda: self._line.form,
+            change=self._change_form,
+            drop_received=self._purge,
+            drop_written=self._drop_writes,
+            send_break=lambda: self._line.uart.host_breaks(),
+            line_state=self._line_state,
+            plugged_in=lambda: self._plugged,
+        )
+        self._manager = ComPort(settings, self._replies.extend)
 
     def _read(self, max_bytes: int) -> bytes:
         manager = self._manager
@@ -68,28 +84,31 @@ class Rfc2217Endpoint(TcpEndpoint):
                 self._written += byte
             if len(manager.suboption or b"") <= MAX_SUBOPTION:
                 return self._take_written()
-        # pyserial raises these for truncated, unknown or misplaced options.
-        except (struct.error, KeyError, TypeError, ValueError):
+        except (TypeError, ValueError):  # the former by pyserial, for a misplaced SE
             pass
         self._drop()
         return b""
 
     def _write(self, data: bytearray) -> int:
         self._flush()
-        if self._replies or self._manager is None:
+        if self._replies or self._manager is None or self._manager.suspended:
             return 0
+        self._arrived = True
         count = min(len(data), CHUNK_BYTES)
         self._replies += data[:count].replace(IAC, IAC_DOUBLED)
         self._flush()
         return count
 
     def _flush(self) -> None:
-        if self._replies and self._client is not None:
+        suspended = self._manager is not None and self._manager.suspended
+        if self._replies and self._client is not None and not suspended:
             sent = super()._write(self._replies)
             del self._replies[:sent]
 
     def _events(self, *, reading: bool) -> int:
         events = super()._events(reading=reading and len(self._replies) <= CHUNK_BYTES)
+        if self._manager is not None and self._manager.suspended:
+            return events & ~select.POLLOUT
         return events | (select.POLLOUT if self._replies else 0)
 
     def _drop(self) -> None:
@@ -116,40 +135,26 @@ class Rfc2217Endpoint(TcpEndpoint):
         self._unread.clear()
         self._line.take(self._now_ps)
 
-    def _notify_errors(self, framing_before: int, parity_before: int) -> None:
-        state = FRAMING_ERROR if self._line.framing_errors > framing_before else 0
-        state |= PARITY_ERROR if self._line.parity_errors > parity_before else 0
-        if state & self._manager.linstate_mask:
-            self._manager.rfc2217_send_subnegotiation(SERVER_NOTIFY_LINESTATE, bytes([state]))
+    def _line_state(self) -> int:
+        state = com_port.DATA_READY if self._unread else 0
+        if not self._line.uart.host_backlog:
+            state |= com_port.HOLDING_EMPTY | com_port.SHIFT_EMPTY
+        return state
 
-
-def _setting(name: str) -> property:
-    """A field of the line's format; an invalid value raises ValueError and changes nothing."""
-
-    def change(settings: "_Settings", value: object) -> None:
-        settings.change(LineFormat(**(vars(settings.line.form) | {name: value})))
-
-    return property(lambda settings: getattr(settings.line.form, name), change)
-
-
-@dataclass
-class _Settings:
-    """The line's end for PortManager, with the attribute names of pyserial's Serial."""
-
-    line: HostLine
-    change: Callable[[LineFormat], None]
-    reset_input_buffer: Callable[[], None]
-    reset_output_buffer: Callable[[], None]
-    cts = dsr = cd = True
-    ri = rts = dtr = xonxoff = rtscts = False
-    baudrate, bytesize = _setting("baud"), _setting("data_bits")
-    parity, stopbits = _setting("parity"), _setting("stop_bits")
-
-    @property
-    def break_condition(self) -> bool:
-        return False
-
-    @break_condition.setter
-    def break_condition(self, on: bool) -> None:
-        if on:
-            self.line.uart.host_breaks()
+    def _notify(self, framing_before: int, parity_before: int, breaks_before: int) -> None:
+        """Notify the client of errors since the last exchange, and of a line that became idle."""
+        assert self._manager is not None
+        state = com_port.DATA_READY if self._arrived else 0
+        if self._line.framing_errors > framing_before:
+            state |= com_port.FRAMING_ERROR
+        if self._line.parity_errors > parity_before:
+            state |= com_port.PARITY_ERROR
+        if self._line.breaks > breaks_before:
+            state |= com_port.BREAK
+        if self.overruns > self._overruns:
+            state |= com_port.OVERRUN
+        idle = not self._line.uart.host_backlog
+        if idle and not self._idle:
+            state |= com_port.HOLDING_EMPTY | com_port.SHIFT_EMPTY
+        self._idle, self._overruns, self._arrived = idle, self.overruns, False
+        self._manager.notify_line(state)

@@ -24,13 +24,18 @@ MAX_UNSENT = 4096
 
 
 class SerialPort(Endpoint):
-    """The buffers, and the order of an exchange; subclasses have the descriptors."""
+    """The buffers, and the order of an exchange; subclasses have the descriptors.
+
+    Attributes:
+        overruns: how often bytes were dropped that the client did not read in time.
+    """
 
     def __init__(self, uart: Uart) -> None:
         self._line = HostLine(uart)
         self._unread = bytearray()
         self._served: object = None
         self._plugged = True
+        self.overruns = 0
 
     @property
     def congested(self) -> bool:
@@ -50,6 +55,7 @@ class SerialPort(Endpoint):
             self._unread.clear()
             return
         self._unread += arrived
+        self.overruns += len(self._unread) > MAX_UNREAD
         del self._unread[:-MAX_UNREAD]
         if self._unread:
             del self._unread[: self._write(self._unread)]

@@ -210,6 +210,70 @@ def test_pty_exclusive_use_ends_with_the_client(port, device, connect):
     assert not exclusive(connect().fd)
 
 
+def open_slave(path) -> int:
+    return os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+
+
+def locked(path) -> bool:
+    slave = open_slave(path)
+    try:
+        return struct.unpack("i", fcntl.ioctl(slave, TIOCGEXCL, bytes(4)))[0] != 0
+    finally:
+        os.close(slave)
+
+
+@a_pty
+def test_pty_exclusive_use_ends_with_a_client_that_nobody_saw(port, device, path):
+    slave = open_slave(path)
+    fcntl.ioctl(slave, termios.TIOCEXCL)
+    os.close(slave)
+    port.exchange(device.kernel.now)
+    assert not locked(path)
+
+
+@a_pty
+def test_pty_stopped_output_ends_with_the_client(port, device, path, connect):
+    slave = open_slave(path)
+    port.exchange(device.kernel.now)
+    termios.tcflow(slave, termios.TCOOFF)
+    os.close(slave)
+    port.exchange(device.kernel.now)
+    assert_fresh(port, device, connect())
+
+
+@pytest.mark.parametrize("own", [False, True], ids=["inherited", "its own"])
+def test_pty_client_that_follows_at_once_is_a_new_one(device, path, own):
+    reports = []
+    port = PtyEndpoint(path, device.uart, report=reports.append)
+
+    def begin(baud) -> int:
+        slave = open_slave(path)
+        if baud:
+            settings = termios.tcgetattr(slave)
+            settings[4] = settings[5] = baud
+            termios.tcsetattr(slave, termios.TCSANOW, settings)
+        os.write(slave, b"?")
+        return slave
+
+    try:
+        first = begin(termios.B9600)
+        port.exchange(device.advance(10))
+        device.sends(port, b"for the first")
+        os.close(first)
+        second = begin(termios.B4800 if own else None)
+        port.exchange(device.advance(10))
+        assert [
+            f"{baud} 8N1" in text for text, baud in zip(reports, (9600, 4800), strict=False)
+        ] == ([True, True] if own else [True])
+        device.sends(port, b"new")
+        assert os.read(second, 100) == b"new"
+        baud = termios.tcgetattr(second)[4]
+        assert (baud == termios.B4800) if own else (baud == termios.B1000000)
+        os.close(second)
+    finally:
+        port.close()
+
+
 @a_pty
 def test_pty_that_can_not_be_unlocked_is_replaced(port, device, path, connect, monkeypatch):
     """For a user who is not root, TIOCEXCL of a client that has gone locks everyone out."""
