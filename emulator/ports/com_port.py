@@ -209,7 +209,7 @@ COMMANDS = {
         "FLOWCONTROL-SUSPEND",
         0,
         ComPort._suspend,
-        "nothing: the client asked for silence, and 108 would silence the client",
+        "nothing: the client wants silence, and 108 would silence the client",
     ),
     FLOWCONTROL_RESUME: Command("FLOWCONTROL-RESUME", 0, ComPort._resume, "no value"),
     SET_LINESTATE_MASK: Command("SET-LINESTATE-MASK", 1, ComPort._set_line_mask, "the mask"),
