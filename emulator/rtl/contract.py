@@ -24,6 +24,10 @@ from cubestack.emulator.rtl.wiring import CameraPins, Wiring
 from cubestack.emulator.sim.fpga_port import STEPS, TAKE, Driver, Transactions
 
 
+class UnsettledError(ValueError):
+    """The design oscillates at one instant."""
+
+
 class PinEvent(NamedTuple):
     """A change of an input pin."""
 

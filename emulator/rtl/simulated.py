@@ -103,7 +103,6 @@ class SimulatedEngine(RtlEngine):
         self._put_sample(stream)
 
     def _put_sample(self, stream: _Stream) -> None:
-        # These are inputs of registers only, so they have no effect before the next rising edge.
         loaded = stream.loaded
         line, pixel = (0, 0) if loaded is None else loaded.sample(stream.edge // 2)
         self._put(stream.pins.line, line)
@@ -138,9 +137,11 @@ class SimulatedEngine(RtlEngine):
         falling = stream.edge % 2
         stream.edge += 1
         if falling:
+            self._drive(time_ps, stream.pins.clock, 0)
+            # The camera's lines move after its clock.
             if stream.edge < loaded.edges:
                 self._put_sample(stream)
-            self._drive(time_ps, stream.pins.clock, 0)
+                self._settle(time_ps)
             return
         self._drive(time_ps, stream.pins.clock, 1)
         stream.low_clocks = 0 if self._get(stream.pins.line) else stream.low_clocks + 1

@@ -4,7 +4,7 @@ All pins that belong to no camera and no memory lead to the microcontroller.
 """
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 from amaranth.lib.wiring import In
@@ -125,6 +125,7 @@ class Wiring:
         burst_levels: levels of inputs for which the compiled engine gets an optimised copy of the
             design; each one lengthens the build.
         bus: the microcontroller's external bus; None if it does not lead here.
+        foreign: the design is a user's: it may have any clocks and paths, see :meth:`with_design`.
     """
 
     component: PinnedComponent
@@ -139,6 +140,19 @@ class Wiring:
     contention: str | None = None
     burst_levels: tuple[Levels, ...] = ()
     bus: BusPins | None = None
+    foreign: bool = False
+
+    def with_design(self, component: PinnedComponent) -> "Wiring":
+        """The same surroundings of a user's design, whose pixel clocks always have an effect."""
+        cameras = tuple(camera.name for camera in self.cameras)
+        return replace(
+            self,
+            component=component,
+            storing=lambda _level: cameras,
+            stored=lambda _level: (),
+            burst_levels=(),
+            foreign=True,
+        )
 
     @cached_property
     def widths(self) -> dict[str, int]:

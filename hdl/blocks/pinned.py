@@ -40,6 +40,8 @@ class Stride:
 class PinnedComponent(Component):
     """A whole FPGA, or a model of several: its ports are those of a pin table."""
 
+    _MustUse__silence = True  # Amaranth warns of unused components, but the pins may suffice
+
     def __init__(self, pins: Iterable[Pin]) -> None:
         self.pins = tuple(pins)  #: the table, with the widths of this component
         super().__init__(

@@ -32,7 +32,6 @@ class Gateware(RtlilComponent):
         notices: tuple[str, ...] = (),
     ) -> None:
         super().__init__(pins)
-        self._MustUse__silence = True  # Amaranth need not elaborate it
         self.notices = notices
         self._title, self._rtlil, self._component = title, rtlil, component
 

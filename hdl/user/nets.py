@@ -18,15 +18,16 @@ _SCOPE = re.compile(r"\\([^\\]+?)\.(?=[\\$])")
 def name_nets(netlist: Netlist) -> None:
     """Replace all names of nets; each output port becomes a copy of what drives it."""
     initial = _initial_levels(netlist)
-    _copy_outputs(netlist)
+    registers = [*_registers(netlist)]
+    _copy_outputs(netlist, {name for name, _ in registers})
     nets: dict[str, list[Bit]] = {
         name: port["bits"] for name, port in netlist.ports.items() if port["direction"] == "input"
     }
     named = {bit for bits in nets.values() for bit in bits}
-    for name, bits in [*_registers(netlist)]:
+    for name, bits in registers:
         fresh = [bit for bit in bits if bit not in named]
         if fresh:
-            nets[name if name not in nets else f"{name}_register"] = fresh
+            nets[name] = fresh
             named.update(fresh)
     numbers = count(1)
     for cell in netlist.cells.values():
@@ -70,9 +71,9 @@ def _initial_levels(netlist: Netlist) -> dict[Bit, str]:
     return levels
 
 
-def _copy_outputs(netlist: Netlist) -> None:
+def _copy_outputs(netlist: Netlist, registers: set[str]) -> None:
     for name, port in netlist.ports.items():
-        if port["direction"] == "output":
+        if port["direction"] == "output" and name not in registers:
             bits = [netlist.new_bit() for _ in port["bits"]]
             width = f"{len(bits):032b}"
             netlist.cells[f"$copy${name}"] = {
@@ -89,12 +90,20 @@ def _copy_outputs(netlist: Netlist) -> None:
 def _registers(netlist: Netlist) -> Iterator[tuple[str, list[Bit]]]:
     """Bits of each register with its path in the source."""
     stored: dict[Bit, str] = {}  # scope of what stores it
+    whole = set[tuple[Bit, ...]]()  # registers as the cells have them
     for name, cell in netlist.cells.items():
         if FLIP_FLOPS.match(cell["type"]) or LATCHES.match(cell["type"]):
             scope = ".".join(_SCOPE.findall(name)) if name.startswith("$flatten") else ""
             stored.update(dict.fromkeys(cell["connections"]["Q"], scope))
+            whole.add(tuple(cell["connections"]["Q"]))
     candidates = sorted(
-        (_rank(name, net["bits"], stored), name)
+        (
+            (
+                tuple(net["bits"]) not in whole,
+                *_rank(name, net["bits"], stored, name in netlist.ports),
+            ),
+            name,
+        )
         for name, net in netlist.nets.items()
         if not net.get("hide_name") and {*net["bits"]} & {*stored}
     )
@@ -104,15 +113,14 @@ def _registers(netlist: Netlist) -> Iterator[tuple[str, list[Bit]]]:
         for first, last in _runs(bit in stored and bit not in found for bit in bits):
             part = bits[first : last + 1]
             found.update(part)
-            whole = len(part) == len(bits)
             place = f"[{first}]" if first == last else f"[{last}:{first}]"
-            yield (name if whole else name + place), part
+            yield (name if len(part) == len(bits) else name + place), part
     hidden = [bit for bit in stored if bit not in found]
     for number, bit in enumerate(hidden):
         yield f"unnamed{number}", [bit]
 
 
-def _rank(name: str, bits: list[Bit], stored: dict[Bit, str]) -> tuple[Any, ...]:
+def _rank(name: str, bits: list[Bit], stored: dict[Bit, str], is_port: bool) -> tuple[Any, ...]:
     """Smallest for the name that the source gives to a register."""
     owners = {stored[bit] for bit in bits if bit in stored}
     scope = owners.pop() if len(owners) == 1 else ""
@@ -121,7 +129,7 @@ def _rank(name: str, bits: list[Bit], stored: dict[Bit, str]) -> tuple[Any, ...]
     depth = 0 if scope else -name.count(".")
     mixed = any(bit not in stored for bit in bits)
     declared = inside and (not scope or "." not in rest)
-    return mixed, not declared, "$" in name, depth, -len(bits), len(name)
+    return mixed, not declared, "$" in name, depth, is_port, -len(bits), len(name)
 
 
 def _runs(flags: Iterable[bool]) -> Iterator[tuple[int, int]]:

@@ -31,12 +31,7 @@ def fit_pins(netlist: Netlist, pins: Iterable[Pin], name: str) -> tuple[Pin, ...
             netlist_ports[port.name] = {"direction": direction, "bits": bits}
     _rename_nets(netlist, netlist_ports)
     netlist.module["ports"] = netlist.ports = netlist_ports
-    left = next((c for c in netlist.cells.values() if c["type"] == "$tribuf"), None)
-    if left:
-        raise GatewareError(
-            f"{name}: {netlist.name_of(left['connections']['Y'])} can be 'z' but is no "
-            "bidirectional pin of the board"
-        )
+    _join_inner_buses(netlist, name)
     return pins
 
 
@@ -45,6 +40,37 @@ def _further_outputs(netlist: Netlist, pins: tuple[Pin, ...]) -> Iterator[Pin]:
     for name, port in netlist.ports.items():
         if port["direction"] == "output" and name.lower() not in known:
             yield Pin(name, "output", UNCONNECTED, len(port["bits"]))
+
+
+def _join_inner_buses(netlist: Netlist, name: str) -> None:
+    """Replace buses between tri-state buffers inside of the design by logic."""
+    buffers: dict[Bit, list[tuple[Bit, Bit]]] = {}
+    for key, cell in [*netlist.cells.items()]:
+        if cell["type"] == "$tribuf":
+            pins = cell["connections"]
+            for bit, source in zip(pins["Y"], pins["A"], strict=True):
+                buffers.setdefault(bit, []).append((source, pins["EN"][0]))
+            del netlist.cells[key]
+    shown = {bit for port in netlist.ports.values() for bit in port["bits"]}
+    for bit, drivers in buffers.items():
+        if len(drivers) == 1 and bit in shown:
+            raise GatewareError(
+                f"{name}: {netlist.name_of([bit])} can be 'z', but is no bidirectional pin "
+                "of the board, and nothing else drives it"
+            )
+    joined = {bit: _joined(netlist, drivers)[0] for bit, drivers in buffers.items()}
+    if joined:
+        _replace(netlist, joined)
+
+
+def _joined(netlist: Netlist, drivers: Iterable[tuple[Bit, Bit]]) -> tuple[Bit, Bit]:
+    """Level and enable of a line with several tri-state drivers; 0 while none is on."""
+    level: Bit = "0"
+    enable: Bit = "0"
+    for source, on in drivers:
+        level = netlist.add_gate("$or", level, netlist.add_gate("$and", source, on))
+        enable = netlist.add_gate("$or", enable, on)
+    return level, enable
 
 
 def _in_parts(found: dict[str, Any], pin: Pin) -> bool:
@@ -117,9 +143,7 @@ def _split(netlist: Netlist, pin: Pin, name: str) -> dict[str, list[Bit]]:
         if len(drivers) == 1:
             level, enable = drivers[0]
         elif drivers:
-            for source, on in drivers:
-                level = netlist.add_gate("$or", level, netlist.add_gate("$and", source, on))
-                enable = netlist.add_gate("$or", enable, on)
+            level, enable = _joined(netlist, drivers)
         if not pin.level_in and not always and isinstance(bit, int):
             inside[bit] = level
         levels.append(level)
@@ -153,7 +177,11 @@ def _replace(netlist: Netlist, bits: dict[Bit, Bit]) -> None:
     for cell in netlist.cells.values():
         pins = cell["connections"]
         for port, connected in pins.items():
-            pins[port] = [bits.get(bit, bit) for bit in connected]
+            if cell["port_directions"][port] == "input":
+                pins[port] = [bits.get(bit, bit) for bit in connected]
+    for connected in netlist.ports.values():
+        if connected["direction"] == "output":
+            connected["bits"] = [bits.get(bit, bit) for bit in connected["bits"]]
 
 
 def _rename_nets(netlist: Netlist, ports: dict[str, Any]) -> None:

@@ -27,7 +27,7 @@ proc -norom
 chformal -remove
 delete t:$print
 flatten
-tribuf -logic
+tribuf
 opt_expr
 opt_clean
 memory_collect
@@ -72,9 +72,14 @@ class _Reader:
     def convert(self, pins: tuple[Pin, ...], parameters: Parameters) -> Converted:
         netlist = Netlist(self._only_module(self._flat(parameters)))
         notices = tuple(self._latches(netlist))
+        if conflicts := netlist.conflicts():
+            raise self._error(f"driven from more than one place: {', '.join(conflicts[:8])}")
         if loop := netlist.loop():
             raise self._error(f"a loop of logic without a register: {', '.join(loop[:8])}")
+        if not netlist.split_loops():
+            raise self._error("an operator's result feeds back into other bits of its operands")
         pins = fit_pins(netlist, pins, self._source.name)
+        netlist.load_sets_and_resets()
         name_nets(netlist)
         return Converted(write_rtlil(netlist), pins, notices)
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from cubestack.emulator.native import cache
 from cubestack.emulator.native.compiler import Compiler, compile_library
+from cubestack.emulator.rtl.cxxrtl.edges import edges_after_commit
 from cubestack.emulator.rtl.cxxrtl.pins_header import pins_header
 from cubestack.emulator.rtl.cxxrtl.variants import variant_text
 from cubestack.emulator.rtl.wiring import Wiring
@@ -19,7 +20,15 @@ from cubestack.hdl.flow.generate import (
 
 _FOLDER = Path(__file__).parent
 
-SOURCES = ("*.cpp", "*.h", "pins_header.py", "clock_steps.py", "variants.py", "strides.py")
+SOURCES = (
+    "*.cpp",
+    "*.h",
+    "pins_header.py",
+    "clock_steps.py",
+    "variants.py",
+    "strides.py",
+    "edges.py",
+)
 """Files of this folder that a library depends on."""
 
 
@@ -57,7 +66,7 @@ _design_hash = lru_cache(maxsize=8)(design_hash)
 
 
 def _compile(wiring: Wiring, compiler: Compiler, scratch: Path, log: Path) -> Path:
-    design = cxxrtl_text(wiring.component)
+    design = edges_after_commit(cxxrtl_text(wiring.component))
     (scratch / "design.cpp").write_text(design)
     rtlil = rtlil_text(wiring.component)
     variants = [variant_text(rtlil, levels) for levels in wiring.burst_levels]

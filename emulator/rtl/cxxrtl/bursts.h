@@ -15,7 +15,7 @@ public:
     Bursts(uint8_t *const *memories, const SramTiming &timing, int64_t keep, bool skipping)
         : Settled(memories, timing, keep), skipping(skipping), strides(skipping) {}
 
-    void load(int camera, const Segment &next, int64_t edge) {
+    void load(int camera, const Segment &next, int64_t edge, int64_t now) {
         Stream &stream = streams[camera];
         stream.segment = next;
         stream.pixels = nullptr;
@@ -25,11 +25,15 @@ public:
             Camera<n()>::frame(top, next.vsync);
             put_sample<n()>(top);
         });
+        if (FOREIGN)
+            settle(now);
     }
 
-    void use_pixels(int camera, const uint8_t *rendered) {
+    void use_pixels(int camera, const uint8_t *rendered, int64_t now) {
         streams[camera].pixels = rendered;
         with(camera, [&](auto n) { put_sample<n()>(top); });
+        if (FOREIGN)
+            settle(now);
     }
 
     // Runs the edges of the cameras in the mask `running` up to `until`, or up to one that changes
@@ -63,6 +67,8 @@ protected:
     Outcome burst_on(Model &top, int64_t until, uint32_t running, int64_t &reached,
                      int32_t &camera) {
         Outcome outcome = TIME_REACHED;
+        for (Stream &stream : streams)
+            stream.restless = true;
         if (running & (running - 1))
             return burst_of_several(top, until, running, reached, camera);
         for (camera = 0; running >> (camera + 1); camera++) {}
@@ -91,23 +97,28 @@ private:
         Camera<N>::data(top, streams[N].pixel());
     }
 
-    template <int N, class Model> void run_edge(Model &top, int64_t time, int64_t until) {
+    // With `alone`, no other camera's clock runs.
+    template <int N, class Model>
+    void run_edge(Model &top, int64_t time, int64_t until, bool alone) {
         Stream &stream = streams[N];
         if (stream.edge % 2 == 0) {
             const bool wrote = writes();
             Camera<N>::clock(top, true);
             const bool changed = settle_rise<N>(top, time);
             stream.next_edge();
-            if (skipping && !changed && !wrote && !stream.inside())
+            if (skipping && !changed && !stream.restless && !wrote && !stream.inside() &&
+                (alone || !FOREIGN))
                 stream.skip_low_samples(until);
             return;
         }
         Camera<N>::clock(top, false);
+        // The camera's lines move after its clock, so a falling edge samples the old levels.
+        const bool fell = FOREIGN && settle_fall<N>(top, time);
         if (stream.edge + 1 < stream.segment.edges) {
             stream.next_sample();
             put_sample<N>(top);
         }
-        settle_fall<N>(top, time);
+        stream.restless = settle_fall<N>(top, time) || fell;
         stream.next_edge();
     }
 
@@ -164,7 +175,7 @@ private:
                 return TIME_REACHED;
             }
             reached = time;
-            run_edge<N>(top, time, until);
+            run_edge<N>(top, time, until, true);
             if (acknowledges(top) != before)
                 return ACKNOWLEDGE_CHANGED;
         }
@@ -188,7 +199,7 @@ private:
                 return TIME_REACHED;
             }
             reached = time;
-            with(camera, [&](auto n) { run_edge<n()>(top, time, until); });
+            with(camera, [&](auto n) { run_edge<n()>(top, time, until, false); });
             if (acknowledges(top) != before)
                 outcome = ACKNOWLEDGE_CHANGED;
             else if (streams[camera].over())

@@ -228,12 +228,13 @@ void driver_power(Driver *driver, int32_t memory, int32_t on, int64_t now) {
     driver->power(memory, on != 0, now);
 }
 
-void driver_load(Driver *driver, int32_t camera, const Segment *segment, int64_t edge) {
-    driver->load(camera, *segment, edge);
+void driver_load(Driver *driver, int32_t camera, const Segment *segment, int64_t edge,
+                 int64_t now) {
+    driver->load(camera, *segment, edge, now);
 }
 
-void driver_use_pixels(Driver *driver, int32_t camera, const uint8_t *pixels) {
-    driver->use_pixels(camera, pixels);
+void driver_use_pixels(Driver *driver, int32_t camera, const uint8_t *pixels, int64_t now) {
+    driver->use_pixels(camera, pixels, now);
 }
 
 int32_t driver_burst(Driver *driver, int64_t until, uint32_t running, int64_t *reached,
@@ -259,7 +260,10 @@ int64_t driver_access(Driver *driver, const Transactions *wanted, int64_t event,
 }
 
 // Number of violations stored; writes those from number `first` on to `out`, unless null.
+// -1 once the design oscillates.
 int64_t driver_violations(const Driver *driver, int64_t first, Violation *out) {
+    if (driver->unsettled)
+        return -1;
     const std::vector<Violation> &kept = driver->log.kept;
     if (out)
         std::copy(kept.begin() + first, kept.end(), out);

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.emulator.rtl import sram
-from cubestack.emulator.rtl.contract import BurstEnd, RtlEngine
+from cubestack.emulator.rtl.contract import BurstEnd, RtlEngine, UnsettledError
 from cubestack.emulator.rtl.cxxrtl.build import library_for
 from cubestack.emulator.rtl.pixel_clock import LoadedSegment
 from cubestack.emulator.rtl.wiring import Wiring
@@ -38,8 +38,8 @@ _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "driver_flip": (None, (_POINTER, _INT, _INT, _LONG)),
     "driver_state": (_LONG, (_POINTER, _POINTER)),
     "driver_power": (None, (_POINTER, _INT, _INT, _LONG)),
-    "driver_load": (None, (_POINTER, _INT, _LONGS, _LONG)),
-    "driver_use_pixels": (None, (_POINTER, _INT, _POINTER)),
+    "driver_load": (None, (_POINTER, _INT, _LONGS, _LONG, _LONG)),
+    "driver_use_pixels": (None, (_POINTER, _INT, _POINTER, _LONG)),
     "driver_burst": (_INT, (_POINTER, _LONG, ctypes.c_uint32, _LONGS, _INT_OUT)),
     "driver_strobe": (None, (_POINTER, _POINTER, *[_LONG] * 5)),
     "driver_access": (_LONG, (_POINTER, _LONGS, _LONG, ctypes.c_uint32, _INT_OUT)),
@@ -200,11 +200,14 @@ class CompiledEngine(RtlEngine):
         segment, half = loaded.segment, loaded.half_period
         clock = segment.start_ps, half.numerator, half.denominator, loaded.edges
         lines = segment.rows, loaded.line_clocks, loaded.active_columns, segment.vsync
-        self._library.driver_load(self._handle, camera, _int64_array(*clock, *lines), edge)
+        segment_now = _int64_array(*clock, *lines), edge, self.now_ps
+        self._library.driver_load(self._handle, camera, *segment_now)
+        self._collect_violations()
 
     def _use_pixels(self, camera: int, pixels: NDArray[np.uint8]) -> None:
         # The loaded segment keeps the array alive while the driver reads it.
-        self._library.driver_use_pixels(self._handle, camera, pixels.ctypes.data)
+        self._library.driver_use_pixels(self._handle, camera, pixels.ctypes.data, self.now_ps)
+        self._collect_violations()
 
     def _burst(self, until_ps: int, cameras: Sequence[int]) -> tuple[int, BurstEnd, int]:
         self._reached.value = self.now_ps
@@ -244,6 +247,11 @@ class CompiledEngine(RtlEngine):
         kept = self._library.driver_violations(self._handle, known, None)
         if kept == known:
             return
+        if kept < 0:
+            raise UnsettledError(
+                f"{self.wiring.component.title} oscillates at {self.now_ps / 1e12:.9f} s: "
+                "its logic feeds back into a clock, a reset or a latch, and does not settle"
+            )
         new = (_LONG * 6 * (kept - known))()
         self._library.driver_violations(self._handle, known, new)
         for kind, time_ps, address, found, needed, place in new:

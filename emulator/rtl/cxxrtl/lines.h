@@ -78,6 +78,9 @@ template <int N> struct Memory;
         template <class Model> static void offer(Model &top, uint8_t value) { \
             top.d_i.template set<uint8_t>(value); \
         } \
+        template <class Model> static uint8_t offered(const Model &top) { \
+            return top.d_i.template get<uint8_t>(); \
+        } \
     };
 MEMORIES
 

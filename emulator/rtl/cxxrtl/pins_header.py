@@ -21,6 +21,7 @@ def pins_header(wiring: Wiring, design: str, variants: Sequence[str] = ()) -> st
     - BUS_HIGH, BUS_LOW_I, BUS_LOW_O, BUS_LOW_OE, BUS_LATCH, BUS_READ, BUS_WRITE: pins of the
       external bus, if there is one; BUS_SELECTS: SELECT(number, port) of every chip select.
     - ACKNOWLEDGES, CONTENTION: levels in one word each.
+    - FOREIGN: whether it is a user's design, of which nothing is known.
     - REGISTERS: REGISTER(name, port, bits) of every register.
     - derived_edge(top): whether a clock that is not a pin has an edge that takes effect;
       forget_derived_edges(top) clears these edges.
@@ -43,6 +44,7 @@ def pins_header(wiring: Wiring, design: str, variants: Sequence[str] = ()) -> st
         "DATA": port(wiring.data),
         "ACKNOWLEDGES": f"({acknowledges})",
         "CONTENTION": "0u" if wiring.contention is None else _level(wiring.contention),
+        "FOREIGN": "true" if wiring.foreign else "false",
         "REGISTERS": " \\\n    ".join(_registers(design)),
         **_bus(wiring.bus),
         "VARIANTS": " ".join(f"VARIANT({n})" for n in range(len(variants))),
@@ -104,8 +106,9 @@ def _derived_edges(wiring: Wiring, design: str, namespace: str) -> str:
     pins = {port(name) for name in wiring.initial}
     detectors = re.findall(r"bool ((?:pos|neg)edge_(\w+))\(\) const", design)
     edges = [f"top.{detector}()" for detector, clock in detectors if clock not in pins]
-    clocks = [clock for clock in re.findall(r"prev_(p_\w+) = \1;", design) if clock not in pins]
-    forget = " ".join(f"top.prev_{clock} = top.{clock};" for clock in clocks)
+    levels = re.findall(r"prev_(\w+) = (\1(?:\.curr)?);", design)
+    clocks = [(clock, level) for clock, level in levels if clock not in pins]
+    forget = " ".join(f"top.prev_{clock} = top.{level};" for clock, level in clocks)
     return (
         f"inline bool derived_edge(const {namespace}::p_top &top) "
         f"{{ (void)top; return {' || '.join(edges) or 'false'}; }}\n"

@@ -4,7 +4,8 @@
 // commit() makes those current and returns whether any changed. Outputs follow a register change
 // one eval() later, and an asynchronous reset takes one more, hence settle(). eval() detects edges
 // at its start, so an edge that it produces itself, on a clock that is not a pin, needs another
-// eval() before the commit.
+// eval() before the commit. An edge of a register counts after its commit (edges.py), so what it
+// clocks samples the new levels of the other registers, as in Verilog and VHDL.
 
 #pragma once
 
@@ -16,6 +17,9 @@
 #include <vector>
 
 namespace {
+
+// Most commits at one instant; a design that needs more oscillates.
+constexpr int MOST_ROUNDS = 1000;
 
 class Settled {
 public:
@@ -30,6 +34,7 @@ public:
 
     Top top;
     ViolationLog log;
+    bool unsettled = false;  // the design oscillates
 
     void set(const Pin &pin, uint32_t value, int64_t now) {
         if (strcmp(pin.name, DATA_CLOCK_NAME) == 0 && value && !top.DATA_CLOCK.get<bool>())
@@ -53,19 +58,44 @@ protected:
 
     bool settle(int64_t time) { return settle(top, time); }
 
-    // Settles the design and the memories at `time`; returns whether any register changed.
+    // Settles the design and the memories at `time`; returns whether any register, or any pin of a
+    // memory, changed.
     template <class Model> bool settle(Model &top, int64_t time) {
-        bool changed = false;
-        eval(top);
-        while (commit(top)) {
-            changed = true;
-            eval(top);
+        constexpr auto memories = std::make_integer_sequence<int, MEMORY_COUNT>();
+        bool changed = settle_registers(top);
+        changed |= drive_memories(top, time, memories);
+        if constexpr (FOREIGN) {
+            // What the memories offer may pass through the design to any pin.
+            for (int rounds = 0; offer(top, memories) && !unsettled; rounds++) {
+                changed |= settle_registers(top);
+                drive_memories(top, time, memories);
+                unsettled |= rounds > MOST_ROUNDS;
+            }
+        } else {
+            offer(top, memories);
+#ifdef BUS_HIGH
+            if (std::any_of(srams.begin(), srams.end(), [](auto &sram) { return sram.reads(); }))
+                eval(top);
+#endif
         }
-        drive_memories(top, time, std::make_integer_sequence<int, MEMORY_COUNT>());
         const uint32_t now_contended = CONTENTION;
         if (now_contended & ~contention)
             log.add({WIRE_CONTENTION, time, 0, now_contended, 0, -1});
         contention = now_contended;
+        return changed;
+    }
+
+    template <class Model> bool settle_registers(Model &top) {
+        bool changed = false;
+        eval(top);
+        for (int rounds = 0; commit(top); rounds++) {
+            changed = true;
+            eval(top);
+            if (rounds > MOST_ROUNDS) {
+                unsettled = true;
+                break;
+            }
+        }
         return changed;
     }
 
@@ -84,15 +114,22 @@ protected:
         return top.Model::commit();
     }
 
-    // Only registers and the external bus depend on the memories, so one eval() at most is needed.
+    // Only registers and the external bus of a shipped design depend on the memories.
     template <class Model, int... N>
-    void drive_memories(Model &top, int64_t time, std::integer_sequence<int, N...>) {
-        (srams[N].drive(time, Memory<N>::pins(top)), ...);
+    bool drive_memories(Model &top, int64_t time, std::integer_sequence<int, N...>) {
+        bool moved = false;
+        ((moved |= srams[N].drive(time, Memory<N>::pins(top))), ...);
+        return moved;
+    }
+
+    // Returns whether the memories offer anything else than before.
+    template <class Model, int... N>
+    bool offer(Model &top, std::integer_sequence<int, N...>) {
+        bool moved = false;
+        if constexpr (FOREIGN)
+            ((moved |= Memory<N>::offered(top) != srams[N].bus()), ...);
         (Memory<N>::offer(top, srams[N].bus()), ...);
-#ifdef BUS_HIGH
-        if ((srams[N].reads() || ...))
-            eval(top);
-#endif
+        return moved;
     }
 
     void sample(int64_t time) {
@@ -109,7 +146,7 @@ protected:
     // Settle after an edge of camera N's clock. A variant computes only what the edge affects,
     // unless registers are in reset; see clock_steps.py.
     template <int N> bool settle_rise(Top &top, int64_t time) { return settle(top, time); }
-    template <int N> void settle_fall(Top &top, int64_t time) { settle(top, time); }
+    template <int N> bool settle_fall(Top &top, int64_t time) { return settle(top, time); }
 
     template <int N, class Model> bool settle_rise(Model &top, int64_t time) {
         constexpr std::integral_constant<int, N> camera;
@@ -122,14 +159,13 @@ protected:
         return changed;
     }
 
-    template <int N, class Model> void settle_fall(Model &top, int64_t time) {
+    template <int N, class Model> bool settle_fall(Model &top, int64_t time) {
         constexpr std::integral_constant<int, N> camera;
-        if (top.in_reset(camera)) {
-            settle_in_reset(top, time);
-            return;
-        }
+        if (top.in_reset(camera))
+            return settle_in_reset(top, time);
         top.fall(camera);
         follow<N>(top, time);
+        return false;
     }
 
     template <class Model>

@@ -84,9 +84,10 @@ public:
         reads_since = released_at = LONG_AGO;
     }
 
-    void drive(int64_t time, SramPins next) {
+    // Returns whether a pin changed.
+    bool drive(int64_t time, SramPins next) {
         if (next == pins || !powered)
-            return;
+            return false;
         const SramPins old = pins;
         pins = next;
         const bool moved = pins.address() != old.address();
@@ -104,6 +105,7 @@ public:
             selected_since = time;
         if (!pins.same_data(old))
             data_since = time;
+        return true;
     }
 
     // Whether clocks from `time` on, each low for `low` of `period`, can store a byte each at

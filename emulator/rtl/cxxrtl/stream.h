@@ -60,6 +60,7 @@ struct Stream {
     int64_t edge = 0;                 // the next one
     Steps times{1, 1, 0};             // time of that edge, from the segment's start
     int64_t row = 0, column = 0;      // place of the sample on the lines
+    bool restless = true;             // whether the last falling edge may have changed anything
 
     int64_t time() const { return segment.start + times.value(); }
 
@@ -100,7 +101,7 @@ struct Stream {
     // First edge after `time`.
     int64_t edge_after(int64_t time) const { return times.last_within(time - segment.start) + 1; }
 
-    // After a clock that changed no register, no further one does while the inputs stay the same:
+    // After a clock whose edges both changed nothing, no further one does while the inputs stay the same:
     // continues with the falling edge of the last such clock. The SRAMs see no pulse meanwhile.
     void skip_low_samples(int64_t until) {
         const int64_t end = segment.rows ? (row + 1) * segment.line_clocks : segment.edges / 2;

@@ -74,7 +74,10 @@ _MEMORY = """\
 
 
 class Played(NamedTuple):
-    """Settled levels of the watched pins after each event, shape (events, pins); the memories."""
+    """Settled levels of the watched pins after each event, shape (events, pins); the memories.
+
+    A level with undefined bits is -1.
+    """
 
     outputs: NDArray[np.int64]
     memories: dict[str, bytes]
@@ -83,18 +86,25 @@ class Played(NamedTuple):
 class IcarusBoard:
     """A top's Verilog between its memories, compiled once; its files are in ``folder``.
 
-    :meth:`play` tells the ``watched`` outputs; all of them when not given.
+    :meth:`play` tells the ``watched`` outputs; all of them when not given. With ``edges``, inputs
+    go from undefined to their first levels, which a reset of an active level needs.
     """
 
     def __init__(
-        self, folder: Path, wiring: Wiring, verilog: str, watched: Sequence[str] = ()
+        self,
+        folder: Path,
+        wiring: Wiring,
+        verilog: str,
+        watched: Sequence[str] = (),
+        *,
+        edges: bool = True,
     ) -> None:
         self._folder = folder
         self._wiring = wiring
         self._watched = watched or wiring.output_pins
         (folder / "top.v").write_text(verilog)
-        (folder / "bench.v").write_text(_bench(wiring, self._watched))
-        command = ["iverilog", "-g2005", "-s", "bench", "-o", "bench.vvp", "bench.v", "top.v"]
+        (folder / "bench.v").write_text(_bench(wiring, self._watched, edges))
+        command = ["iverilog", "-g2012", "-s", "bench", "-o", "bench.vvp", "bench.v", "top.v"]
         subprocess.run(command, cwd=folder, check=True, timeout=LIMIT_S)
 
     def play(self, events: Sequence[PinEvent]) -> Played:
@@ -104,7 +114,8 @@ class IcarusBoard:
             file.writelines(f"{time_ps} {codes[pin]} {level:d}\n" for time_ps, pin, level in events)
         command = ["vvp", "-n", "bench.vvp"]
         subprocess.run(command, cwd=self._folder, check=True, capture_output=True, timeout=LIMIT_S)
-        levels = np.fromfile(self._folder / "outputs.txt", np.int64, sep=" ")
+        text = (self._folder / "outputs.txt").read_text()
+        levels = np.array(re.sub("[xXzZ]", "-1", text).split(), np.int64)
         memories = {
             memory.name: _read_hex(self._folder / f"memory_{n}.hex")
             for n, memory in enumerate(self._wiring.memories)
@@ -117,12 +128,16 @@ def _driven(wiring: Wiring) -> dict[str, str]:
     return {name: name for name in wiring.initial} | supplies
 
 
-def _bench(wiring: Wiring, watched: Sequence[str]) -> str:
+def _bench(wiring: Wiring, watched: Sequence[str], edges: bool) -> str:
     pins = wiring.widths
     kinds = {name: "reg" if name in wiring.initial else "wire" for name in pins}
+    start = {name: f" = {level}" for name, level in wiring.initial.items() if not edges}
     numbers = range(len(wiring.memories))
     return _BENCH.format(
-        declarations="".join(f"  {kinds[name]} [{w - 1}:0] {name};\n" for name, w in pins.items()),
+        declarations="".join(
+            f"  {kinds[name]} [{width - 1}:0] {name}{start.get(name, '')};\n"
+            for name, width in pins.items()
+        ),
         ports=", ".join(f".{name}({name})" for name in pins),
         memories="\n".join(_memory(n, memory, pins) for n, memory in enumerate(wiring.memories)),
         initial="\n".join(f"    {name} = {level};" for name, level in wiring.initial.items()),
