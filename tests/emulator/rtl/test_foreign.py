@@ -1,7 +1,6 @@
 """Foreign designs of CubeStar store and read what the shipped one does."""
 
 from fractions import Fraction
-from pathlib import Path
 
 import numpy as np
 import pytest
