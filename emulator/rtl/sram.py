@@ -157,6 +157,15 @@ class Sram:
         self._selected_since = self._reads_since = self._released_at = LONG_AGO
 
     @property
+    def powered(self) -> bool:
+        return self._powered
+
+    @property
+    def reads(self) -> bool:
+        """Whether it drives the data bus, with a byte or without supply."""
+        return self._pins.reads
+
+    @property
     def bus(self) -> int:
         """Level of the data bus: the memory's byte, else the FPGA's, else 0 on a floating bus."""
         if self._pins.reads:

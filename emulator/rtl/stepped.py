@@ -144,8 +144,13 @@ class SteppedEngine(RtlEngine):
             self._drive(now_ps, stream.pins.clock, edge % 2)
 
     def _strobe(self, out: NDArray[np.uint8], period: Fraction, fraction: Fraction) -> None:
+        for number in range(len(out)):
+            self._strobe_clock(out, number, period, fraction)
+
+    def _strobe_clock(
+        self, out: NDArray[np.uint8], number: int, period: Fraction, fraction: Fraction
+    ) -> None:
         clock = self.wiring.data_clock
-        for i in range(len(out)):
-            self._drive(self.now_ps + int(fraction + i * period), clock, 1)
-            out[i] = self._get(self.wiring.data)
-            self._drive(self.now_ps + int(fraction + (i + Fraction(1, 2)) * period), clock, 0)
+        self._drive(self.now_ps + int(fraction + number * period), clock, 1)
+        out[number] = self._get(self.wiring.data)
+        self._drive(self.now_ps + int(fraction + (number + Fraction(1, 2)) * period), clock, 0)
