@@ -14,15 +14,16 @@ e.g. ``profile="extended"``. ``time.sleep`` and the clocks of the code under tes
 test prints the fault events.
 """
 
+from argparse import ArgumentTypeError
 from contextlib import nullcontext
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from cubestack.firmware_model.interface.codec.switches import DEFAULT_PROFILE, PROFILES
-from cubestack.host.devices.device import Engine
+from cubestack.host.devices.device import ENGINE_FORM, Engine, engine_name
 from cubestack.host.devices.registry import device_names, devices
 from cubestack.host.emulation.virtual_clock import VirtualClock
 
@@ -39,6 +40,13 @@ _DEVICES = pytest.StashKey[dict[str, Any]]()
 _CLOCK = VirtualClock()
 
 
+def _engine(text: str) -> str:
+    try:
+        return engine_name(text)
+    except ValueError as error:
+        raise ArgumentTypeError(str(error)) from None
+
+
 def pytest_addoption(parser: pytest.Parser) -> None:
     group = parser.getgroup("cubestack", "emulated CubeSat camera sensors")
     group.addoption(
@@ -51,8 +59,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     )
     group.addoption(
         "--cubestack-engine",
-        choices=get_args(Engine),
+        type=_engine,
         default="auto",
+        metavar=ENGINE_FORM,
         help="how to run the FPGA (default: compiled, if a compiler is installed)",
     )
     group.addoption(

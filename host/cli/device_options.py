@@ -4,11 +4,17 @@ import argparse
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any
 
 from cubestack.firmware_model.values import whole
 from cubestack.host.cli.arguments import add_flag, add_path, add_value
-from cubestack.host.devices.device import PROFILE_OPTIONS, AnyDevice, BoardOption, Engine
+from cubestack.host.devices.device import (
+    ENGINE_FORM,
+    PROFILE_OPTIONS,
+    AnyDevice,
+    BoardOption,
+    engine_name,
+)
 from cubestack.host.devices.registry import device_names, devices
 from cubestack.host.emulation.emulated import AnyEmulated, check_options
 from cubestack.host.emulation.records import (
@@ -44,10 +50,19 @@ def add_start_arguments(
 def add_engine_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--engine",
-        choices=get_args(Engine),
+        type=_engine,
         default="auto",
-        help="how to run the FPGA (default: compiled, if a compiler is installed)",
+        metavar=ENGINE_FORM,
+        help="how to run the FPGA (default: compiled, if a compiler is installed); a development"
+        " board as docs/how-to/fpga-board.md describes",
     )
+
+
+def _engine(text: str) -> str:
+    try:
+        return engine_name(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
 
 
 def add_board_arguments(parser: argparse.ArgumentParser) -> None:

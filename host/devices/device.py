@@ -9,11 +9,14 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import KW_ONLY, dataclass, field
 from keyword import iskeyword
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, Literal, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeAlias, TypeVar
 
 from cubestack.firmware_model.interface.cameras.registers import CameraRegisterMap
 from cubestack.firmware_model.interface.codec.message import Interface
 from cubestack.firmware_model.interface.codec.switches import DEFAULT_PROFILE, PROFILES, Switches
+from cubestack.firmware_model.interface.devboard.address import FORM as BOARD_FORM
+from cubestack.firmware_model.interface.devboard.address import PREFIX as BOARD_PREFIX
+from cubestack.firmware_model.interface.devboard.address import parse_address
 from cubestack.firmware_model.values import TEXT, Declaration, ValueKind
 from cubestack.host.clients.contract import Client, DeviceClient
 from cubestack.host.options import SWITCH, option_string
@@ -28,9 +31,27 @@ if TYPE_CHECKING:
     from cubestack.host.devices.experiment import AnyExperiment
     from cubestack.host.pictures.overlay import Overlay
 
-#: How to run an FPGA: compiled if a compiler is installed, always compiled, compiled without
-#: shortcuts (clock by clock), or in Amaranth's simulator.
-Engine = Literal["auto", "compiled", "exact", "python"]
+Engine: TypeAlias = str
+"""How to run an FPGA: one of ``ENGINES``, or the address of a development board."""
+
+ENGINES = {
+    "auto": "compiled, if a compiler is installed",
+    "compiled": "the compiled design",
+    "exact": "compiled, without shortcuts: clock by clock",
+    "python": "Amaranth's simulator",
+}
+
+ENGINE_FORM = "|".join([*ENGINES, BOARD_FORM])
+
+
+def engine_name(text: str) -> Engine:
+    """Check it; ValueError for a text that names no engine."""
+    if text.startswith(BOARD_PREFIX):
+        parse_address(text)
+    elif text not in ENGINES:
+        raise ValueError(f"{text!r} is no engine; choose from {', '.join(ENGINES)}, {BOARD_FORM}")
+    return text
+
 
 #: Progress display: (items, total, label) -> the same items.
 Shown = Callable[[Iterable[Any], int, str], Iterator[Any]]

@@ -92,13 +92,8 @@ class DevboardEngine(SteppedEngine):
         self._wanted = self._inputs.put(self._wanted, name, value)
 
     def _drive(self, time_ps: int, name: str, value: int) -> None:
-        if value or name not in self._clocks:
-            self._flush()  # only a falling pixel clock changes together with other pins
+        self._flush()  # what a clock samples changes before it
         super()._drive(time_ps, name, value)
-
-    @property
-    def _clocks(self) -> tuple[str, ...]:
-        return tuple(camera.clock for camera in self.wiring.cameras)
 
     def _settle(self, time_ps: int) -> None:
         self._flush()
@@ -355,7 +350,14 @@ class DevboardEngine(SteppedEngine):
         done = first
         for number, response in enumerate(self.link.exchange(requests())):
             self._check(response, Status.OK, Status.ADDRESS, Status.FULL)
-            done = self._absorb_reads(memory, out, done, sent[number], response, period, fraction)
+            part = sent[number], response
+            done = self._absorb_reads(memory, out, done, *part, period, fraction)
+        if self._inputs.get(self._wanted, self.wiring.data_clock):
+            # The address was not the predicted one, so the board lacks the memory's byte.
+            out[done] = self._get(self.wiring.data)
+            half = int(fraction + (done + Fraction(1, 2)) * period)
+            self._drive(self.now_ps + half, self.wiring.data_clock, 0)
+            done += 1
         return done
 
     def _absorb_reads(
@@ -400,11 +402,6 @@ class DevboardEngine(SteppedEngine):
             self._absorb(time_of(number))
             if rising:
                 out[first + number // 2] = self._level(self.wiring.data)
-            number += 1
-        if number % 2:  # the memory's byte is missing yet
-            self._flush()
-            out[first + number // 2] = self._get(self.wiring.data)
-            self._drive(time_of(number), clock, 0)
             number += 1
         return first + number // 2
 

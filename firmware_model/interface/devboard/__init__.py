@@ -24,10 +24,12 @@ steps it has executed. A request with the flag :data:`CHAINED` is then answered 
 not executed, so a host can send requests that depend on the success of those before. A request
 without the flag is always executed.
 
-:mod:`~.table` declares operations, statuses and limits, :mod:`~.frames` codes frames,
-:mod:`~.layout` packs pins, :mod:`~.outputs` has the predicted outputs by which responses are short.
+:mod:`~.address` has the form of a board's name, :mod:`~.table` declares operations, statuses and
+limits, :mod:`~.frames` codes frames, :mod:`~.layout` packs pins, :mod:`~.outputs` has the predicted
+outputs by which responses are short.
 """
 
+from cubestack.firmware_model.interface.devboard.address import BoardAddress, parse_address
 from cubestack.firmware_model.interface.devboard.frames import (
     Frame,
     FrameDecoder,
@@ -66,6 +68,7 @@ __all__ = [
     "RESPONSES",
     "VERSION",
     "WINDOW",
+    "BoardAddress",
     "Camera",
     "Code",
     "Deviation",
@@ -85,4 +88,5 @@ __all__ = [
     "decode_deviations",
     "encode_deviation",
     "encode_frame",
+    "parse_address",
 ]
