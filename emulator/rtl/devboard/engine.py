@@ -44,7 +44,7 @@ class _Clocks(NamedTuple):
     """Clocks of a camera in one request: RUN, or STORE with a pixel each."""
 
     first: int  #: number of the first sample
-    count: int
+    clocks: int
     line: int
     pixels: bytes  #: put at each falling edge
     low_clocks: int  #: clocks in a row with the line pin low, after them
@@ -162,13 +162,13 @@ class DevboardEngine(SteppedEngine):
         def requests() -> Iterator[Request]:
             for part in self._plan(stream, loaded, stream.edge // 2 + clocks):
                 planned.append(part)
-                values = {"camera": camera, "memory": self._stored_in[camera]}
+                numbers = {"camera": camera, "memory": self._stored_in[camera]}
                 if part.pixels:
-                    payload = OPERATIONS[Code.STORE].request(part.pixels, **values)
+                    payload = OPERATIONS[Code.STORE].request(part.pixels, **numbers)
                     yield Request(Code.STORE, payload, len(planned) > 1)
                 else:
-                    line = {"line": part.line, "pixel": 0, "clocks": part.count}
-                    payload = OPERATIONS[Code.RUN].request(**values, **line)
+                    numbers |= {"line": part.line, "pixel": 0, "clocks": part.clocks}
+                    payload = OPERATIONS[Code.RUN].request(b"", **numbers)
                     yield Request(Code.RUN, payload, len(planned) > 1)
 
         edge = stream.edge
@@ -241,7 +241,7 @@ class DevboardEngine(SteppedEngine):
             if drives and not self._level(own.ce_n):
                 self._stored_in[camera] = place
         stream.edge = first + response.done
-        whole = response.done == 2 * part.count
+        whole = response.done == 2 * part.clocks
         stream.low_clocks = part.low_clocks if whole else 0
         return stream.edge - 1
 
