@@ -25,7 +25,7 @@ _SYNTHESIS: Mapping[Family, str] = {
 }
 
 
-class BoardError(ValueError):
+class BoardError(ToolError):
     """A design that a board can't run; the text is one line."""
 
 
@@ -59,8 +59,9 @@ class Fit:
             )
         return ""
 
-    def json(self) -> str:
-        return json.dumps({**asdict(self), "runs": not self.problem}, indent=1)
+    def values(self) -> dict[str, str | int | float]:
+        """For JSON."""
+        return {**asdict(self), "problem": self.problem}
 
     def text(self) -> str:
         return "\n".join(
@@ -86,8 +87,7 @@ def build(
 ) -> Fit:
     """Synthesise, place, route and pack into ``folder``, which is created.
 
-    The bitstream is written only if the design fits and is fast enough; the placed netlist and
-    the placer's report as far as it gets.
+    The bitstream is written only if the design is fast enough: see ``Fit.problem``.
 
     Raises:
         ToolMissingError: an extra is not installed.

@@ -30,7 +30,7 @@ class BridgeTiming:
 
     Attributes:
         clock_hz: of its clock.
-        baud: of the serial line; an integer fraction of it.
+        baud: of the serial line.
         settle: clocks from a change of the inputs to the use of the outputs.
     """
 
@@ -39,15 +39,18 @@ class BridgeTiming:
     settle: int = 3
 
     def __post_init__(self) -> None:
-        if self.baud < 1 or self.clock_hz % self.baud or self.divider < 2:
+        """Raise ValueError for a rate that the clock can not be divided to within 1 %."""
+        most = self.clock_hz // 2
+        if not 1 <= self.baud <= most or abs(self.clock_hz / self.divider / self.baud - 1) > 0.01:
+            near = self.clock_hz / max(2, round(self.clock_hz / max(1, self.baud)))
             raise ValueError(
-                f"baud must be {self.clock_hz} Hz divided by a whole number of at least 2, "
-                f"not {self.baud}"
+                f"a clock of {self.clock_hz / 1e6:g} MHz can not be divided to {self.baud} baud; "
+                f"the nearest rate is {near:.0f}"
             )
 
     @property
     def divider(self) -> int:
-        return self.clock_hz // self.baud
+        return round(self.clock_hz / self.baud)
 
 
 class PinBridge(Component):

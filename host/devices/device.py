@@ -23,6 +23,7 @@ from cubestack.host.options import SWITCH, option_string
 
 if TYPE_CHECKING:
     from cubestack.emulator.boards.contract import Board
+    from cubestack.emulator.rtl.wiring import Wiring
     from cubestack.emulator.scene.form import SceneForm
     from cubestack.firmware_model.interface.efm32gg.table import Processor
     from cubestack.hdl.contract.contract import Contract
@@ -200,6 +201,7 @@ class Device(Generic[BoardT_co, ClientT_co]):
         tops: tops of its FPGAs, and blocks, by name, as ``hdl.flow`` takes them.
         proofs: formal properties of them by name.
         contract: what it requires of a design for its FPGA; None where nothing is declared.
+        wirings: cameras and memories around tops, by the tops' names; the first is the default.
         prepare: makes what takes seconds the first time, such as a catalogue; it is given what
             shows progress: (items, total, label) -> the items. ``open_board`` makes it silently.
         conformance: what the protocol suite must know of it beside its tables.
@@ -228,6 +230,7 @@ class Device(Generic[BoardT_co, ClientT_co]):
     tops: "Callable[[], TopTable]" = dict
     proofs: "Callable[[], Mapping[str, Proof]]" = dict
     contract: "Callable[[], Contract] | None" = None
+    wirings: "Callable[[], Mapping[str, Callable[[], Wiring]]]" = dict
     prepare: Callable[[Shown], None] = lambda _shown: None
     conformance: ConformanceNotes = field(default_factory=ConformanceNotes)
     processor: "Callable[[], Processor] | None" = None

@@ -192,6 +192,7 @@ DEVICE: "Device[CubeStarStack, CubeStar]" = Device(
     tops=get("cubestack.hdl.cubestar.tops:TOPS"),
     proofs=get("cubestack.hdl.proofs.cubestar:PROOFS"),
     contract=get("cubestack.hdl.contract.cubestar.declared:CONTRACT"),
+    wirings=get("cubestack.emulator.boards.cubestar.wiring:WIRINGS"),
     image_sensor=REGISTERS,
     conformance=ConformanceNotes(
         effects={

@@ -1,7 +1,7 @@
 """Wiring of CubeSense's two FPGAs."""
 
-from collections.abc import Collection
-from functools import cache
+from collections.abc import Callable, Collection, Mapping
+from functools import cache, partial
 
 from cubestack.emulator.rtl.wiring import CameraPins, Level, MemoryPins, Wiring
 from cubestack.firmware_model.interface.cubesense import pins
@@ -55,3 +55,10 @@ def _clocks_used(*controls: int) -> tuple[str | None, str | None]:
     sun = {Action.STORE: "sun", Action.STORE_OTHER: "nadir"}.get(acts.sun)
     nadir = {Action.STORE: "nadir", Action.STORE_OTHER: "sun"}.get(acts.nadir)
     return sun, nadir
+
+
+#: Wirings of whole boards, by the names of their tops.
+WIRINGS: Mapping[str, Callable[[], Wiring]] = {
+    "cubesense-pair": cubesense_wiring,
+    "cubesense-pair-addressing": partial(cubesense_wiring, mcu_addressing=True),
+}

@@ -1,6 +1,6 @@
 """Wiring of the FPGAs in each of CubeStar's memory layouts."""
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection, Mapping
 
 from amaranth.lib.wiring import Component
 
@@ -114,3 +114,12 @@ def _on_bus(
             pins.WE_N,
         ),
     )
+
+
+#: Wirings of whole boards, by the names of their tops.
+WIRINGS: Mapping[str, Callable[[], Wiring]] = {
+    "cubestar": cubestar_wiring,
+    "cubestar-shared": cubestar_shared_wiring,
+    "cubestar-double": cubestar_double_wiring,
+    "cubestar-boards": cubestar_two_boards_wiring,
+}

@@ -9,6 +9,7 @@ examples:
   cubestack hdl prove sun-scan
   cubestack hdl test design.v --device DEVICE
   cubestack hdl wave whole_frame
+  cubestack hdl board icebreaker --top TOP --out out/board
 """
 
 import argparse
@@ -17,12 +18,12 @@ from collections.abc import Callable, Mapping
 from cubestack.hdl.flow.top import TopTable
 from cubestack.hdl.proofs.prover import Proof
 from cubestack.host.cli.arguments import Parser
-from cubestack.host.cli.hdl import area, compare, prove, test, verilog, wave
+from cubestack.host.cli.hdl import area, board, compare, prove, test, verilog, wave
 from cubestack.host.devices.registry import merged_tables
 
 #: One module per action, in the order of the help. Each has NAME, HELP, DESCRIPTION,
 #: ``add_arguments`` and ``run``.
-ACTIONS = (area, verilog, prove, test, wave, compare)
+ACTIONS = (area, verilog, prove, test, wave, compare, board)
 
 
 def _all_tops() -> TopTable:

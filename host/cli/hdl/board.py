@@ -1,0 +1,105 @@
+"""`cubestack hdl board`."""
+
+import argparse
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cubestack.firmware_model.interface.devboard.table import BAUD
+from cubestack.firmware_model.values import whole
+from cubestack.hdl.devboard.boards import BOARDS
+from cubestack.host.cli.arguments import Parser, add_flag, add_value
+from cubestack.host.cli.hdl.choice import one
+from cubestack.host.devices.registry import device as registered
+from cubestack.host.devices.registry import devices, merged_tables
+from cubestack.host.terminal import busy, say, tell
+
+if TYPE_CHECKING:
+    from cubestack.emulator.rtl.wiring import Wiring
+
+NAME = "board"
+
+HELP = "build the bitstream of a development board"
+
+DESCRIPTION = """Build a bitstream with an FPGA design and a bridge to the serial port, so that a
+development board takes the place of the compiled FPGA model. Needs the extra
+board. Writes the bitstream, the placed netlist and the placer's report.
+
+Exit status 1 if the design does not fit or is too slow.
+
+examples:
+  cubestack hdl board icebreaker --top TOP --out out/board
+  cubestack hdl board ulx3s --gateware design.v --device DEVICE --out out/board
+  cubestack hdl board icebreaker --top TOP --baud 1000000 --out out/board --json"""
+
+_Wirings = Mapping[str, "Callable[[], Wiring]"]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    actions = parser.add_subparsers(
+        dest="board", required=True, metavar="BOARD", parser_class=Parser
+    )
+    for board in BOARDS.values():
+        own = actions.add_parser(board.name, help=board.title, description=DESCRIPTION)
+        _add_build_arguments(own)
+        own.set_defaults(board_action=_build)
+
+
+def _add_build_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--top", metavar="TOP", help="a shipped design; a wrong name lists them")
+    parser.add_argument("--gateware", metavar="FILE", help="your own design (docs/own-gateware.md)")
+    names = [device.name for device in devices() if device.has_fpga]
+    parser.add_argument("--device", choices=names, help="the device whose pins it has")
+    add_value(parser, "baud", whole(BAUD, "rate of the serial port", 1))
+    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="where to write")
+    add_flag(parser, "--json", "print JSON")
+
+
+def run(args: argparse.Namespace) -> int:
+    return int(args.board_action(args))
+
+
+def _build(args: argparse.Namespace) -> int:
+    from cubestack.emulator.rtl.devboard.lines import lines_of
+    from cubestack.hdl.devboard.bitstream import BITSTREAM, build
+    from cubestack.hdl.devboard.bridge import BridgeTiming
+
+    board = BOARDS[args.board]
+    timing = BridgeTiming(board.bridge_hz, args.baud)
+    name, wiring = _design(args)
+    with busy(f"building {name} for {board.title}", quiet=args.json):
+        fit = build(wiring.component, lines_of(wiring), board, timing, name, args.out)
+    if args.json:
+        print(json.dumps({**fit.values(), "folder": str(args.out)}, indent=1))
+    else:
+        tell(fit.text())
+    if fit.problem:
+        say(fit.problem)
+        return 1
+    if not args.json:
+        say(f"{args.out / BITSTREAM} is the bitstream")
+    return 0
+
+
+def _design(args: argparse.Namespace) -> "tuple[str, Wiring]":
+    """The design's name, and its wiring."""
+    if args.gateware and not args.device:
+        raise ValueError("--gateware needs --device, the device whose pins the design has")
+    if args.device:
+        wirings: _Wirings = registered(args.device).wirings()
+    else:
+        wirings = merged_tables(lambda device: device.wirings())
+    if not args.device and not args.top:
+        raise ValueError(f"say which design: --top, one of {', '.join(wirings)}, or --gateware")
+    name, make = one(wirings, args.top or next(iter(wirings)), "top with cameras and memories")
+    wiring = make()
+    if not args.gateware:
+        return name, wiring
+    from cubestack.hdl.user import load_gateware
+
+    gateware = load_gateware(args.gateware, wiring.component.pins)
+    for notice in gateware.notices:
+        say(notice)
+    return gateware.title, replace(wiring, component=gateware, burst_levels=())
