@@ -4,7 +4,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from cubestack.firmware_model.interface.devboard import Lines
 from cubestack.hdl.blocks.pinned import PinnedComponent
@@ -13,8 +13,8 @@ from cubestack.hdl.devboard.bridge import BridgeTiming
 from cubestack.hdl.devboard.bridged import BoardTop, Bridged, bridged_rtlil
 from cubestack.hdl.flow.tools import ToolError, run_packer, run_placer, run_yosys
 
-#: Files of a build, beside the bitstream.
-BITSTREAM, PLACED, REPORT = "board.bin", "placed.json", "report.json"
+#: Files of a build: the bitstream, the placed netlist, the placer's report, what was built.
+BITSTREAM, PLACED, REPORT, BUILD = "board.bin", "placed.json", "report.json", "build.json"
 
 #: The cells of each family that are logic.
 _LOGIC: Mapping[Family, str] = {"ice40": "ICESTORM_LC", "ecp5": "TRELLIS_COMB"}
@@ -77,6 +77,21 @@ class Fit:
         )
 
 
+@dataclass(frozen=True)
+class Built:
+    """What a folder contains; ``divider``: clocks of the bridge per bit of the serial line."""
+
+    board: str
+    family: Family
+    top: str
+    divider: int
+
+    @classmethod
+    def load(cls, folder: Path) -> Self:
+        """Raises FileNotFoundError if the folder has no finished build."""
+        return cls(**json.loads((folder / BUILD).read_text(encoding="utf-8")))
+
+
 def build(
     component: PinnedComponent,
     lines: Lines,
@@ -94,7 +109,8 @@ def build(
         BoardError: the design does not fit.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / BITSTREAM).unlink(missing_ok=True)
+    for old in (BITSTREAM, BUILD):
+        (folder / old).unlink(missing_ok=True)
     top = BoardTop(board, Bridged(component, lines, timing, name))
     (folder / "design.il").write_text(bridged_rtlil(top, component), encoding="utf-8")
     (folder / "pins").write_text(board.constraints, encoding="utf-8")
@@ -112,6 +128,8 @@ def build(
         raise BoardError(f"{name} does not fit on {board.name}: {error}") from error
     report = json.loads((folder / REPORT).read_text(encoding="utf-8"))
     fit = _fit(report, board, timing, name)
+    built = Built(board.name, board.family, name, timing.divider)
+    (folder / BUILD).write_text(json.dumps(asdict(built), indent=1), encoding="utf-8")
     if not fit.problem:
         run_packer(board.family, text, BITSTREAM, folder)
     return fit

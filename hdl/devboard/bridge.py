@@ -36,7 +36,7 @@ class BridgeTiming:
 
     clock_hz: int
     baud: int
-    settle: int = 3
+    settle: int = 2
 
     def __post_init__(self) -> None:
         """Raise ValueError for a rate that the clock can not be divided to within 1 %."""

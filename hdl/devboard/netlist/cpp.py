@@ -133,7 +133,7 @@ class _Writer:
         for lut in self.luts:
             inside = {*lut.used()}
             used = [self.level(net) if net in inside else "0" for net in lut.inputs]
-            text = _expression(lut.table, len(used), tuple(used))
+            text = expression(lut.table, tuple(used))
             yield f"const unsigned n{self.local[lut.output]} = {text};"
         for number, flop in enumerate(self.main):
             yield f"d[{number}] = {self._next(flop)};"
@@ -176,14 +176,15 @@ class _Writer:
         return text
 
 
-def _expression(table: int, count: int, names: tuple[str, ...]) -> str:
-    """C++ of a look-up table on levels that are 0 or 1."""
-    constants = {n: int(names[n]) for n in range(count) if names[n] in ("0", "1")}
-    for variable, level in constants.items():
-        table = _cofactor(table, count, variable, level)
+def expression(table: int, names: tuple[str, ...]) -> str:
+    """C++ of a look-up table; the names are expressions of levels, which are 0 or 1."""
+    count = len(names)
+    for variable, name in enumerate(names):
+        if name in ("0", "1"):
+            table = _cofactor(table, count, variable, int(name))
     _, text = _best(table, count)
-    for variable in range(count):
-        text = text.replace(f"@{variable}", names[variable])
+    for variable, name in enumerate(names):
+        text = text.replace(f"@{variable}", name)
     return text
 
 
@@ -229,4 +230,4 @@ def _split(name: str, low: int, high: int, count: int) -> tuple[int, str]:
         return 1 + low_cost, f"({name} | {low_text})"
     if low == ones:
         return 2 + high_cost, f"(({name} ^ 1u) | {high_text})"
-    return 2 + low_cost + high_cost, f"({name} ? {high_text} : {low_text})"
+    return 3 + low_cost + high_cost, f"(({name} & {high_text}) | (({name} ^ 1u) & {low_text}))"

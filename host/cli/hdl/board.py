@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from cubestack.firmware_model.interface.devboard.table import BAUD
 from cubestack.firmware_model.values import whole
 from cubestack.hdl.devboard.boards import BOARDS
+from cubestack.hdl.devboard.netlist import MUTANTS
 from cubestack.host.cli.arguments import Parser, add_flag, add_value
 from cubestack.host.cli.hdl.choice import one
 from cubestack.host.devices.registry import device as registered
@@ -34,6 +35,15 @@ examples:
   cubestack hdl board ulx3s --gateware design.v --device DEVICE --out out/board
   cubestack hdl board icebreaker --top TOP --baud 1000000 --out out/board --json"""
 
+SIMULATE = """Run the placed netlist of a build behind a pseudo-terminal, in place of a board
+with its bitstream. Prints the port, and runs until it is interrupted. Build with
+a high --baud, half of the bridge's clock at most, for a quick simulation.
+
+examples:
+  cubestack hdl board icebreaker --top TOP --baud 12000000 --out out/board
+  cubestack hdl board simulate out/board
+  cubestack hdl board simulate out/board --mutant lut-bit"""
+
 _Wirings = Mapping[str, "Callable[[], Wiring]"]
 
 
@@ -45,6 +55,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         own = actions.add_parser(board.name, help=board.title, description=DESCRIPTION)
         _add_build_arguments(own)
         own.set_defaults(board_action=_build)
+    simulate = actions.add_parser(
+        "simulate", help="run a placed netlist in place of a board", description=SIMULATE
+    )
+    simulate.add_argument("folder", metavar="DIR", type=Path, help="--out of a build")
+    simulate.add_argument("--mutant", choices=list(MUTANTS), help="plant a fault in it")
+    add_value(simulate, "seed", whole(0, "chooses the fault's place", 0))
+    simulate.set_defaults(board_action=_simulate)
 
 
 def _add_build_arguments(parser: argparse.ArgumentParser) -> None:
@@ -81,6 +98,20 @@ def _build(args: argparse.Namespace) -> int:
     if not args.json:
         say(f"{args.out / BITSTREAM} is the bitstream")
     return 0
+
+
+def _simulate(args: argparse.Namespace) -> int:
+    from cubestack.emulator.rtl.board_model.netlist_board import netlist_board
+    from cubestack.emulator.rtl.board_model.port import BoardPort
+
+    with busy("compiling the netlist"):
+        board, fault = netlist_board(args.folder, args.mutant or "", args.seed)
+    if fault:
+        say(fault)
+    with BoardPort(board) as port:
+        print(port.path, flush=True)
+        port.wait()
+    return 1
 
 
 def _design(args: argparse.Namespace) -> "tuple[str, Wiring]":

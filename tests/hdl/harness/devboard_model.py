@@ -54,12 +54,14 @@ class DevboardModel:
         *,
         name: str = "top",
         design_hash: bytes = bytes(8),
+        clock_hz: int = 24_000_000,
+        baud: int = BAUD,
     ) -> None:
         self.inputs, self.outputs = Layout.inputs(pins), Layout.outputs(pins)
         self.lines, self.design = lines, design
         sizes = self.inputs.size, self.outputs.size
         self.identity = Identity(
-            VERSION, *sizes, WINDOW, BUFFER, LONGEST_REQUEST, 24_000_000, BAUD, design_hash, name
+            VERSION, *sizes, WINDOW, BUFFER, LONGEST_REQUEST, clock_hz, baud, design_hash, name
         )
         self.executed = 0
         self._decoder = FrameDecoder()
@@ -68,6 +70,11 @@ class DevboardModel:
         self._kept: dict[int, bytes] = {}  # the latest responses by number
         self._levels = self._staged = self.inputs.initial
         self._known = Outputs(self.outputs, lines, self._get())
+
+    @property
+    def levels(self) -> int:
+        """The design's inputs, packed."""
+        return self._levels
 
     def receive(self, data: bytes) -> bytes:
         damaged = self._decoder.damaged
