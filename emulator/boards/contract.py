@@ -185,6 +185,17 @@ class Board(ABC):
         """Send text on the firmware's debug channels, and reports of its faults, to ``report``."""
         del report  # a modelled program prints nothing
 
+    def connect_program(
+        self, on_exit: Callable[[int], None], read: Callable[[int], bytes | None]
+    ) -> None:
+        """Connect a program that uses semihosting.
+
+        Args:
+            on_exit: receives the status with which it ends.
+            read: the console's input, see ``SemihostingHost``.
+        """
+        del on_exit, read  # a modelled program has no host
+
     def close(self) -> None:
         """Call ``on_close``, and release the engine."""
         for act in self.on_close:

@@ -151,7 +151,7 @@ class Monitor:
         """Output of the command ``words``; ValueError for an invalid one."""
         command = self._commands.get(words[0])
         if command is None:
-            known = ", ".join(["reset", "catch", *self._commands])
+            known = ", ".join(["halt", "resume", "reset", "reg", "mdw", "catch", *self._commands])
             raise ValueError(f"no command {words[0]!r}; known: {known}")
         return command(words[1:])
 

@@ -29,7 +29,7 @@ enum StopReason : int32_t {
     STOP_ASLEEP,      // the core fell asleep
     STOP_AWAKE,       // the core woke
     STOP_BREAKPOINT,  // before the instruction at a breakpoint
-    STOP_WATCHPOINT,  // after the instruction that made the access
+    STOP_WATCHPOINT,  // before the instruction that makes the access
     STOP_STEPPED,     // after one instruction
     STOP_HALTED,      // BKPT with a debugger, at that instruction
     STOP_LOCKED_UP,   // the core is locked up until a reset
@@ -306,8 +306,13 @@ void iss_watch_hit(const IssMachine *machine, uint32_t *hit) {
     hit[4] = found.write;
 }
 
-// Whether BKPT 0xAB is a semihosting call (console, clock, exit) or an ordinary breakpoint.
+// Whether BKPT 0xAB is a semihosting call or an ordinary breakpoint.
 void iss_semihosting(IssMachine *machine, int32_t on) { machine->system.set_semihosting(on); }
+
+void iss_semihosting_answer(IssMachine *machine, uint32_t result) {
+    if (machine->part)
+        machine->part->answer_call(result);
+}
 
 // With a debugger attached BKPT stops, and so do the exceptions in `catches` (DEMCR.VC_*).
 void iss_debugger(IssMachine *machine, int32_t attached, uint32_t catches) {

@@ -128,6 +128,7 @@ _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "iss_watch_hit": (None, (_P, ctypes.POINTER(_U))),
     "iss_debugger": (None, (_P, _I, _U)),
     "iss_semihosting": (None, (_P, _I)),
+    "iss_semihosting_answer": (None, (_P, _U)),
     "iss_hang": (None, (_P,)),
     "iss_stop": (None, (_P,)),
     "iss_fpga": (None, (_P, ctypes.POINTER(FpgaDriverRecord), ctypes.POINTER(FpgaWireRecord), _I)),

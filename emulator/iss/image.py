@@ -1,15 +1,13 @@
-"""Programs for a machine: ELF, Intel HEX, or bytes with a base address.
-
-ELF for the Arm architecture (IHI 0044); Intel Hexadecimal Object File Format, revision A.
-"""
+"""Programs for a machine: ELF, Intel HEX, S-records, UF2, or raw bytes with a base address."""
 
 import re
 from dataclasses import dataclass, field
 from hashlib import sha256
-from io import BytesIO
 from pathlib import Path
 
-from elftools.elf.elffile import ELFFile
+from cubestack.emulator.iss import image_formats
+from cubestack.emulator.iss.file_kind import kind_of_file
+from cubestack.emulator.iss.image_formats import FormatError
 
 VECTORS = 8
 """Bytes of the vector table that are checked: stack pointer and reset vector."""
@@ -24,17 +22,26 @@ class ImageError(ValueError):
 
 @dataclass(frozen=True)
 class Memory:
-    """Address ranges of a machine."""
+    """Address ranges of a machine: what a program may fill, and where its stack may be."""
 
     flash_base: int = 0
     flash_bytes: int = 1 << 20
-    ram_base: int = 0x2000_0000
-    ram_bytes: int = 128 << 10
+    #: user data page and lock bits: written with the flash, EFM32GG Reference Manual, 7.3.2
+    pages: tuple[int, ...] = (0x0FE0_0000, 0x0FE0_4000)
+    page_bytes: int = 4096
+    #: RAM for data and for code, external bus: start and bytes
+    stacks: tuple[tuple[int, int], ...] = (
+        (0x2000_0000, 128 << 10), (0x1000_0000, 128 << 10), (0x8000_0000, 1 << 28),
+        (0x1200_0000, 1 << 26),
+    )  # fmt: skip
 
     def holds(self, address: int, count: int) -> bool:
-        """Whether all these bytes are in the flash."""
-        start = address - self.flash_base
-        return start >= 0 and start + count <= self.flash_bytes
+        """Whether all these bytes are in the flash, or in one of its pages of information."""
+        ranges = (self.flash_base, self.flash_bytes), *((at, self.page_bytes) for at in self.pages)
+        return any(start <= address and address + count <= start + size for start, size in ranges)
+
+    def holds_stack(self, top: int) -> bool:
+        return any(start < top <= start + size for start, size in self.stacks)
 
 
 @dataclass(frozen=True)
@@ -63,13 +70,14 @@ class Image:
         return sum(len(data) for _, data in self.segments)
 
 
-def load_image(name: str | Path, memory: Memory | None = None) -> Image:
-    """Read a program: ELF, Intel HEX (``.hex``, ``.ihx``), or any other file as plain bytes.
+def load_image(name: str | Path, memory: Memory | None = None, base: int | None = None) -> Image:
+    """Read a program, whose format shows in its contents.
 
     Args:
-        name: path; ``FILE@0xADDRESS`` sets the address of plain bytes, by default the start of the
-            flash; an optional ``#HASH`` is compared with the start of the program's hash.
+        name: path; an optional ``#HASH`` is compared with the start of the program's hash.
         memory: of the machine.
+        base: address of raw bytes, which ``FILE@0xADDRESS`` states, too; without one they are
+            rejected.
 
     Raises:
         ImageError: the file cannot be read, or is not a program for the machine.
@@ -78,31 +86,55 @@ def load_image(name: str | Path, memory: Memory | None = None) -> Image:
     text, wanted = str(name), ""
     if (match := _HASH.fullmatch(text)) and not Path(text).exists():
         text, wanted = match[1], match[2]
-    path, base = _split(text, memory)
+    path, stated = _split(text)
+    base = stated if base is None else base
     try:
         data = path.read_bytes()
     except OSError as error:
         raise ImageError(f"{path}: {error.strerror}") from None
     if not data:
         raise ImageError(f"{path} is empty")
-    if data.startswith(b"\x7fELF"):
-        image = Image(_elf_segments(path, data), path, data)
-    elif data.lstrip().startswith(b":") and path.suffix.lower() in (".hex", ".ihx", ".ihex"):
-        image = Image(_hex_segments(path, data), path)
-    elif path.suffix.lower() in (".elf", ".axf", ".out"):
-        raise ImageError(f"{path} is not an ELF file: it begins with {data[:4]!r}")
-    elif path.suffix.lower() in (".hex", ".ihx", ".ihex"):
-        raise ImageError(f"{path} is not an Intel HEX file: its first record has no colon")
+    read = image_formats.format_of(data)
+    if read is None:
+        image = Image(((_base_of(path, data, base), data),), path)
+    elif base is not None:
+        raise ImageError(f"{path} has its own addresses; only raw bytes take a base")
     else:
-        image = Image(((base, data),), path)
+        try:
+            segments = read(data)
+        except FormatError as error:
+            between = ", " if str(error).startswith(("line", "block")) else " "
+            raise ImageError(f"{path}{between}{error}") from None
+        image = Image(segments, path, data if read is image_formats.elf_segments else None)
     check_image(image, memory)
     if not image.hash.startswith(wanted):
         raise ImageError(f"{path} has the hash {image.hash[:16]}, not the requested {wanted}")
     return image
 
 
+SUFFIXES = {
+    "an ELF file": (".elf", ".axf", ".out"),
+    "an Intel HEX file": (".hex", ".ihx", ".ihex"),
+    "a file of S-records": (".srec", ".mot", ".s19", ".s28", ".s37"),
+    "a UF2 file": (".uf2",),
+}
+
+
+def _base_of(path: Path, data: bytes, base: int | None) -> int:
+    """The address of raw bytes; ImageError for files that are none, or without one."""
+    for kind, suffixes in SUFFIXES.items():
+        if path.suffix.lower() in suffixes:
+            raise ImageError(f"{path} is not {kind}: it begins with {data[:4]!r}")
+    if base is None:
+        raise ImageError(
+            f"{path} is {kind_of_file(path, data)}; expected ELF, Intel HEX, S-records or UF2, or "
+            "raw bytes with --firmware-base ADDRESS"
+        )
+    return base
+
+
 def check_image(image: Image, memory: Memory) -> None:
-    """Raise ImageError for a program that does not fit or has no vector table."""
+    """Raise ImageError for a program that does not fit or has no plausible vector table."""
     name = image.path or "the image"
     for address, data in image.segments:
         if not memory.holds(address, len(data)):
@@ -115,10 +147,11 @@ def check_image(image: Image, memory: Memory) -> None:
     if vectors is None:
         raise ImageError(f"{name} has no vector table at {memory.flash_base:#010x}")
     stack, start = (int.from_bytes(vectors[n : n + 4], "little") for n in (0, 4))
-    if stack in (0, 0xFFFF_FFFF) and start in (0, 0xFFFF_FFFF):
-        raise ImageError(
-            f"{name} has no vector table: stack pointer {stack:#010x}, reset vector {start:#010x}"
-        )
+    found = f"{name} has no vector table: stack pointer {stack:#010x}, reset vector {start:#010x}"
+    if not memory.holds_stack(stack):
+        raise ImageError(f"{found}; the stack is not in RAM")
+    if not start & 1 or _bytes_at(image, start & ~1, 2) is None:
+        raise ImageError(f"{found}; the latter is not the address of Thumb code in the program")
 
 
 def _bytes_at(image: Image, address: int, count: int) -> bytes | None:
@@ -132,68 +165,8 @@ def _bytes_at(image: Image, address: int, count: int) -> bytes | None:
     return bytes(found) if any_there else None
 
 
-def _split(name: str, memory: Memory) -> tuple[Path, int]:
+def _split(name: str) -> tuple[Path, int | None]:
     match = _BASE.fullmatch(name)
     if match is None or Path(name).exists():
-        return Path(name), memory.flash_base
+        return Path(name), None
     return Path(match[1]), int(match[2], 0)
-
-
-def _elf_segments(path: Path, data: bytes) -> tuple[tuple[int, bytes], ...]:
-    try:
-        file = ELFFile(BytesIO(data))
-        header = file.header
-        if file.get_machine_arch() != "ARM" or file.elfclass != 32:
-            raise ImageError(
-                f"{path} is for {file.get_machine_arch()} with {file.elfclass} bits, "
-                "not for ARM with 32"
-            )
-        if not file.little_endian:
-            raise ImageError(f"{path} is big-endian: the core is little-endian")
-        if header["e_type"] != "ET_EXEC":
-            raise ImageError(f"{path} is not an executable, but {header['e_type']}")
-        segments = [
-            (int(segment["p_paddr"]), bytes(segment.data()))
-            for segment in file.iter_segments("PT_LOAD")
-            if segment["p_filesz"]
-        ]
-    except ImageError:
-        raise
-    except Exception as error:  # elftools raises various exceptions for damaged files
-        raise ImageError(f"{path} is a damaged ELF file: {error or type(error).__name__}") from None
-    if not segments:
-        raise ImageError(f"{path} has nothing to load: no segment with bytes")
-    return tuple(sorted(segments))
-
-
-def _hex_segments(path: Path, text: bytes) -> tuple[tuple[int, bytes], ...]:
-    segments: list[tuple[int, bytearray]] = []
-    base = 0
-    for number, line in enumerate(text.decode("latin-1").splitlines(), 1):
-        line = line.strip()
-        if not line:
-            continue
-        try:
-            record = bytes.fromhex(line[1:])
-        except ValueError:
-            record = b""
-        if line[0] != ":" or len(record) < 5 or len(record) != 5 + record[0]:
-            raise ImageError(f"{path}, line {number}: not an Intel HEX record")
-        if sum(record) & 0xFF:
-            raise ImageError(f"{path}, line {number}: wrong checksum")
-        offset, kind, data = int.from_bytes(record[1:3], "big"), record[3], record[4:-1]
-        if kind == 0:
-            address = base + offset
-            if segments and segments[-1][0] + len(segments[-1][1]) == address:
-                segments[-1][1].extend(data)
-            else:
-                segments.append((address, bytearray(data)))
-        elif kind == 1:
-            break
-        elif kind in (2, 4):
-            base = int.from_bytes(data, "big") << (4 if kind == 2 else 16)
-        elif kind not in (3, 5):  # 3 and 5 are start addresses; the core uses its vector table
-            raise ImageError(f"{path}, line {number}: unknown record type {kind:02X}")
-    if not segments:
-        raise ImageError(f"{path} has no data records")
-    return tuple(sorted((address, bytes(data)) for address, data in segments))

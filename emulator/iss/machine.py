@@ -26,8 +26,15 @@ EXTERNAL_BASE = 0x8000_0000
 
 FLASH_BYTES = 1 << 20
 RAM_BYTES = 128 << 10
-INFORMATION_BYTES = 3 * 4096
+PAGE_BYTES = 4096
+INFORMATION_BYTES = 3 * PAGE_BYTES
 """User page, lock bits, device information."""
+
+INFORMATION_BASE, PAGE_STEP = 0x0FE0_0000, 0x4000
+"""Address of the first of these pages, and the distance between them."""
+
+LOADED_PAGES = 2
+"""Of them, those that a program's file may fill."""
 
 ANALOG_INPUTS = 32
 """Number of channels; ``analog::Input`` in efm32gg/part/part.h lists them."""
@@ -112,11 +119,15 @@ class Machine:
     # Programs and running
 
     def load(self, image: Image) -> None:
-        """Erase the flash and write a program to it; ``reset`` starts it."""
+        """Erase flash, user page and lock bits and write a program to them; ``reset`` starts it."""
         self.flash[:] = 0xFF
+        self.information[: LOADED_PAGES * PAGE_BYTES] = 0xFF
         for address, data in image.segments:
-            start = address - FLASH_BASE
-            self.flash[start : start + len(data)] = np.frombuffer(data, np.uint8)
+            memory, start = self.flash, address - FLASH_BASE
+            if address >= INFORMATION_BASE:
+                page, start = divmod(address - INFORMATION_BASE, PAGE_STEP)
+                memory = self.information[page * PAGE_BYTES :]
+            memory[start : start + len(data)] = np.frombuffer(data, np.uint8)
         self.image = image
         self.invalidate(FLASH_BASE, self.flash.size)
 
@@ -307,8 +318,12 @@ class Machine:
         self._library.iss_debugger(self.handle, attached, catches)
 
     def semihosting(self, on: bool) -> None:
-        """Whether BKPT 0xAB is a call (console, clock, exit), not a fault."""
+        """Whether BKPT 0xAB is a call of the host, a message ``SEMIHOSTING``, not a fault."""
         self._library.iss_semihosting(self.handle, on)
+
+    def answer_call(self, result: int) -> None:
+        """Answer a semihosting call; until then nothing runs and no time passes."""
+        self._library.iss_semihosting_answer(self.handle, result & 0xFFFF_FFFF)
 
     def _slave(self, unit: int, what: int, byte: int) -> int | None:
         answer = int(self._library.iss_i2c_slave(self.handle, unit, what, byte))

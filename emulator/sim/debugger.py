@@ -28,6 +28,7 @@ from cubestack.emulator.iss.gdb.target import (
 from cubestack.emulator.iss.gdb.target import Stop as Reason
 from cubestack.emulator.iss.machine import Machine
 from cubestack.emulator.iss.outcome import Stop, StopReason, Watch, WatchHit
+from cubestack.emulator.sim import debugger_commands
 from cubestack.emulator.sim.virtual_time import Kernel
 
 WATCHES: Mapping[WatchKind, str] = {"write": "w", "read": "r", "access": "a"}
@@ -38,15 +39,9 @@ CFSR = 0xE000_ED28
 FAULT_SIGNALS = {0xFFFF_0000: SIGILL, 0xFF00: SIGBUS, 0x00FF: SIGSEGV}
 """By the bits of CFSR: usage faults, bus faults, memory management."""
 
-ALL_FAULTS = 0x7F0
-"""Bits VC_* of DEMCR except the one for a reset: C1.6.5."""
-
 BKPT_BYTES = 2
 
 HOLDER = "debugger"
-
-OWN_COMMANDS = """reset [halt]      reset the processor and halt at its first instruction
-catch on|off      halt at faults, before their handlers run"""
 
 
 class Window(Protocol):
@@ -206,14 +201,29 @@ class Debugger:
         if self.halted is None:
             self._halt(Reason(SIGINT))
 
+    def program_ended(self) -> None:
+        """Halt for the debugger, if there is one: the program runs no further until a reset."""
+        if self._attached:
+            self._halt(Reason())
+
     def resume(self) -> None:
-        if self._at_bkpt is not None and self._at_bkpt == self.machine.register("pc"):
-            self.machine.set_register("pc", self._at_bkpt + BKPT_BYTES)
-        self._at_bkpt = None
+        self._pass_bkpt()
         self.halted = None
         self.kernel.release(HOLDER)
 
+    def _pass_bkpt(self) -> int | None:
+        """Step over a BKPT at which the program halted; returns the next address."""
+        at, self._at_bkpt = self._at_bkpt, None
+        if at is None or at != self.machine.register("pc"):
+            return None
+        self.machine.set_register("pc", at + BKPT_BYTES)
+        return at + BKPT_BYTES
+
     def step(self, low: int, high: int) -> None:
+        after = self._pass_bkpt()
+        if after is not None and not low <= after < high:
+            self._halt(Reason())  # the BKPT was the one instruction
+            return
         self.resume()
         self._range, self._halt_on_wake = (low, high), self.machine.asleep
 
@@ -255,14 +265,15 @@ class Debugger:
         self.reset()
 
     def monitor(self, command: str) -> str:
-        match command.split():
-            case [] | ["help"]:
-                return f"{OWN_COMMANDS}\n{self.command(['help'])}"
-            case ["reset"] | ["reset", "halt" | "init"]:
-                self.restart()
-                return ""
-            case ["catch", "on" | "off" as state]:
-                self.machine.attach_debugger(True, ALL_FAULTS if state == "on" else 0)
-                return ""
-            case words:
-                return self.command(words)
+        words = command.split()
+        if words in ([], ["help"]):
+            return f"{debugger_commands.HELP}\n{self.command(['help'])}"
+        output = debugger_commands.perform(self, words)
+        return self.command(words) if output is None else output
+
+    def catch_faults(self, mask: int) -> None:
+        """Halt at these exceptions, bits VC_* of DEMCR, before their handlers run."""
+        self.machine.attach_debugger(True, mask)
+
+    def answer_semihosting(self, on: bool) -> None:
+        self.machine.semihosting(on)

@@ -17,6 +17,7 @@ from cubestack.emulator.iss.insight.fault_report import fault_report, last_fault
 from cubestack.emulator.iss.insight.symbols import Symbols
 from cubestack.emulator.iss.machine import NEVER, Machine
 from cubestack.emulator.iss.outcome import Outgoing, OutgoingKind, Stop, StopReason
+from cubestack.emulator.iss.semihosting import Exit, SemihostingHost
 from cubestack.emulator.sim.firmware_fpga import FpgaCoupling
 from cubestack.emulator.sim.fpga_port import FpgaPort
 from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S, PS_PER_US, Kernel
@@ -36,6 +37,9 @@ QUIET_AWAKE_PS = 5 * PS_PER_S
 FAULT_CHECK_PS = 10 * PS_PER_MS
 """Period of the check whether the program hangs in a fault handler."""
 
+INPUT_POLL_PS = 10 * PS_PER_MS
+"""Period in which a program that waits for console input looks for it."""
+
 INWARD = frozenset({OutgoingKind.SLEEP, OutgoingKind.LOG})
 """Outputs that do not count as activity visible outside."""
 
@@ -48,6 +52,8 @@ class Debugger(Protocol):
     """Runs the machine in place of the processor, and may halt it."""
 
     def run(self, until_ps: int) -> Stop: ...
+
+    def program_ended(self) -> None: ...
 
 
 @dataclass(eq=False)
@@ -64,6 +70,8 @@ class FirmwareProcessor:
         on_activity: called when the core falls asleep (False) or wakes (True).
         console: receives the text that the program prints on its debug channels, line by line.
         on_fault: called with a text when a fault stops the program for good.
+        on_exit: called with the status of a program that ends by semihosting; it runs no further.
+        host: answers semihosting calls, if the machine has them enabled.
         debugger: runs the machine, if not None.
         resets: number of resets since power-up.
         energy_mode: 0 awake, else the energy mode (EM1 to EM4) of the sleep.
@@ -83,6 +91,11 @@ class FirmwareProcessor:
 
     def __post_init__(self) -> None:
         self.debugger: Debugger | None = None
+        self.on_exit: Callable[[int], None] = self._report_exit
+        self.host = SemihostingHost(self.machine)
+        self.host.write = lambda data: self._print(-1, data)
+        self._call: Outgoing | None = None  # that has no answer yet
+        self._exited = False
         self.resets = self.energy_mode = 0
         self._fpga: FpgaPort | None = None
         self._coupling: FpgaCoupling | None = None
@@ -124,7 +137,7 @@ class FirmwareProcessor:
         waiting when no event is due within ``QUIET_PS``, or it had no output for that time.
         """
         now_ps = self.env.now
-        if self._locked_up:
+        if self._locked_up or self._exited or self._call is not None:
             return True
         if self._awake:
             return now_ps > self._active_ps + QUIET_AWAKE_PS
@@ -138,7 +151,9 @@ class FirmwareProcessor:
         """
         self.catch_up()
         if hang_us:
+            self._exited = True
             self.machine.hang()
+            self.machine.answer_call(0)
         else:
             self.machine.reset(self.causes[cause])
         self.wake()
@@ -168,6 +183,12 @@ class FirmwareProcessor:
         env, standing = self.env, 0
         reached_ps = self.machine.now_ps
         while True:
+            if self._call is not None:
+                yield env.timeout(INPUT_POLL_PS)
+                yield from self._empty_outbox()  # a reset ends the call
+                if self._call is not None:
+                    self._answer_call(self._call)
+                continue
             if env.horizon() == env.now:
                 yield env.timeout(0)  # all other processes that are due now run first
             stop = self._run_machine(self._run_limit_ps())
@@ -285,13 +306,14 @@ class FirmwareProcessor:
             case OutgoingKind.RESET:
                 self.resets += 1
                 self._locked_up = False
+                self._call, self._exited = None, False
                 self._reported_faults = 0
                 if one.text:
                     self._report_reset(one.text)
             case OutgoingKind.ITM:
                 self._print(one.unit, one.value.to_bytes(8, "little")[: max(1, one.extra)])
             case OutgoingKind.SEMIHOSTING:
-                self._print(-1, one.text.encode())
+                self._answer_call(one)
             case OutgoingKind.LOG:
                 logger.warning("%s", one.text)
             case OutgoingKind.FAULT:
@@ -299,6 +321,22 @@ class FirmwareProcessor:
         handler = self.handlers.get(one.kind)
         if handler is not None:
             handler(one)
+
+    def _answer_call(self, call: Outgoing) -> None:
+        """Answer a semihosting call, or keep it until there is input."""
+        result = self.host.call(call.unit, call.value, call.time_ps)
+        self._call = call if result is None else None
+        if isinstance(result, Exit):
+            self.machine.hang()
+            self._print(-1, b"\n" if self._lines.get(-1) else b"")
+            if self.debugger is not None:
+                self.debugger.program_ended()
+            self.on_exit(result.status)
+        elif result is not None:
+            self.machine.answer_call(result)
+
+    def _report_exit(self, status: int) -> None:
+        self.on_fault(f"the program exited by semihosting with status {status}")
 
     def _print(self, channel: int, data: bytes) -> None:
         text = self._lines.get(channel, "") + data.decode("latin-1")

@@ -36,6 +36,7 @@ from cubestack.firmware_model.values import whole
 from cubestack.host.cli import device_options
 from cubestack.host.cli.arguments import add_path, add_value
 from cubestack.host.cli.ports import LAST_PORT, add_port_arguments, check_linux, open_ports
+from cubestack.host.cli.program import exit_status, read_console
 from cubestack.host.devices.registry import device, device_names, devices
 from cubestack.host.emulation.emulated import AnyEmulated, power_up
 from cubestack.host.emulation.history import History
@@ -103,7 +104,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Serve until SIGINT or SIGTERM."""
+    """Serve until SIGINT or SIGTERM, or without gdb until a program exits; returns its status."""
+    ended: list[int] = []
     _check(args)
     with ExitStack() as stack:
         opened, setups = _power_up(args, stack)
@@ -114,8 +116,6 @@ def run(args: argparse.Namespace) -> int:
             gdb = device_options.insight(args, stack)(first)
         if args.orbit is not None:
             _follow_orbit(args.orbit, opened)
-        for one in opened:
-            _report_events(one)
         history = _history(args, opened, setups, stack)
         board = first.board  # a recording may have replaced its I2C bus
         adapter = I2cAdapter(board.kernel, board.i2c_bus)
@@ -145,15 +145,28 @@ def run(args: argparse.Namespace) -> int:
         if lifeline is not None:
             stack.callback(lifeline.close)
             lifeline.on_end = scheduler.stop
+
+        def exited(status: int) -> None:
+            say(f"the program exited by semihosting with status {status}")
+            ended.append(exit_status(status))
+            if args.gdb is None:  # else a debugger can look at the program, or restart it
+                scheduler.stop()
+
+        def connect(emulated: AnyEmulated) -> None:
+            _report_events(emulated)
+            emulated.board.connect_program(exited, read_console)
+
+        for one in opened:
+            connect(one)
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, lambda _number, _frame: scheduler.stop())
         _announce(args, opened, served)
         if isinstance(history, History):
-            history.on_arrival = _report_events
+            history.on_arrival = connect
             history.bus = adapter
             history.ports = [(opened.index(owner), line.name, end) for owner, line, end in served]
         scheduler.run()
-    return 0
+    return ended[-1] if ended else 0
 
 
 def _check(args: argparse.Namespace) -> None:

@@ -29,10 +29,12 @@ from cubestack.host.cli.device_options import (
     insight,
     show_notices,
 )
+from cubestack.host.cli.program import exit_status, read_console
 from cubestack.host.devices.device import AnyDevice, BoardOption
 from cubestack.host.devices.experiment import AnyExperiment, Result
 from cubestack.host.devices.registry import device as registered
 from cubestack.host.devices.registry import device_names
+from cubestack.host.emulation.emulated import AnyEmulated
 from cubestack.host.errors import TargetError
 from cubestack.host.experiments.measure import board_as_said, board_options, running
 from cubestack.host.experiments.opener import Opener
@@ -115,7 +117,12 @@ def run_experiment(args: argparse.Namespace, device: AnyDevice, experiment: AnyE
     least: float | None = getattr(args, "min_right", None)
     with ExitStack() as stack:
         look_at = insight(args, stack) if hasattr(args, "gdb") else lambda _emulated: None
-        opened = Opener(device, getattr(args, "engine", "auto"), board, bar, look_at)
+
+        def connect(emulated: AnyEmulated) -> None:
+            look_at(emulated)
+            emulated.board.connect_program(_leave, read_console)
+
+        opened = Opener(device, getattr(args, "engine", "auto"), board, bar, connect)
         shown = bar(experiment.run(opened, options), experiment.count(options), experiment.label)
         try:
             for result in shown:
@@ -135,6 +142,12 @@ def run_experiment(args: argparse.Namespace, device: AnyDevice, experiment: AnyE
     if least is None:
         return 0 if experiment.succeeded(results) else 1
     return 0 if _are_right(results, least) else 1
+
+
+def _leave(status: int) -> None:
+    """End the command as the device's program ended."""
+    say(f"the program exited by semihosting with status {status}")
+    raise SystemExit(exit_status(status))
 
 
 def _are_right(results: list[Result], least: float) -> bool:

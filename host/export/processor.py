@@ -104,6 +104,17 @@ def svd(tables: Processor) -> str:
         },
     )
     _texts(root, name=tables.name, version="1", description=f"{tables.name}, as it is emulated")
+    core = tables.core
+    _texts(
+        Xml.SubElement(root, "cpu"),
+        name=core.name,
+        revision=core.revision,
+        endian="little",
+        mpuPresent=str(core.has_mpu).lower(),
+        fpuPresent="false",
+        nvicPrioBits=core.priority_bits,
+        vendorSystickConfig="false",
+    )
     _texts(root, addressUnitBits=8, width=WORD_BITS, size=WORD_BITS)
     peripherals = Xml.SubElement(root, "peripherals")
     for layout in tables.layouts:

@@ -39,15 +39,24 @@ def _open_board(
     baud: int | None = None,
     layout: str = Layout.COPIED.value,
     firmware: str = "",
+    firmware_base: str = "",
     semihosting: bool = False,
+    semihosting_root: str = "",
     **common: Any,
 ) -> "CubeStarStack":
     if firmware:
+        root = Path(semihosting_root) if semihosting_root else None
+        if root is not None and not root.is_dir():
+            raise ValueError(f"semihosting root {semihosting_root!r} is not a folder; create it")
+        common["base"] = _address(firmware_base) if firmware_base else None
         board = _open_with(firmware, scene, baud or INTERFACE.baud, Layout(layout), **common)
-        board.machine.semihosting(semihosting)
+        if semihosting or root is not None:
+            board.enable_semihosting(root)
         return board
-    if semihosting:
+    if semihosting or semihosting_root:
         raise ValueError("semihosting needs own firmware; choose an image with firmware")
+    if firmware_base:
+        raise ValueError("a firmware base needs own firmware; choose an image with firmware")
     from cubestack.emulator.boards.cubestar.board import CubeStarBoard
     from cubestack.emulator.boards.cubestar.catalogue import onboard_catalogue
 
@@ -60,12 +69,20 @@ def _open_board(
     )
 
 
+def _address(text: str) -> int:
+    try:
+        return int(text, 0)
+    except ValueError:
+        raise ValueError(f"firmware base {text!r} is no address, such as 0x0") from None
+
+
 def _open_with(
     firmware: str,
     scene: "Scene | SkyView",
     baud: int,
     layout: Layout,
     *,
+    base: int | None = None,
     switches: CubeStarSwitches = DEFAULT_SWITCHES,
     **common: Any,
 ) -> "CubeStarFirmwareBoard":
@@ -81,7 +98,7 @@ def _open_with(
 
         image = load_image(f"{reference_image()}{mark}{wanted}")
     else:
-        image = load_image(firmware)
+        image = load_image(firmware, base=base)
     board = CubeStarFirmwareBoard(scene, image, baud=baud, layout=layout, **common)
     board.firmware = name + image.mark
     return board
@@ -175,7 +192,7 @@ DEVICE: "Device[CubeStarStack, CubeStar]" = Device(
         ),
         BoardOption(
             "firmware",
-            "program for the processor: an ELF, Intel HEX or binary file (FILE@0xADDRESS), "
+            "program for the processor: an ELF, Intel HEX, S-record or UF2 file, raw bytes, "
             f"or {REFERENCE}, the same in C, instead of this project's own "
             "(docs/how-to/own-firmware.md)",
             default="",
@@ -184,8 +201,23 @@ DEVICE: "Device[CubeStarStack, CubeStar]" = Device(
             unset="this project's model",
         ),
         BoardOption(
+            "firmware_base",
+            "address of the first byte of --firmware, which is raw bytes",
+            default="",
+            metavar="ADDRESS",
+            unset="not raw bytes",
+        ),
+        BoardOption(
             "semihosting",
             "handle semihosting calls (BKPT 0xAB) of --firmware; without it they are faults",
+        ),
+        BoardOption(
+            "semihosting_root",
+            "folder with the files that semihosting may open, in it and nowhere else; without it "
+            "all are refused",
+            default="",
+            metavar="FOLDER",
+            unset="no files",
         ),
     ),
     processor=get("cubestack.firmware_model.interface.cubestar.processor_pins:PROCESSOR"),

@@ -72,7 +72,10 @@ def test_seed_and_profile_come_from_marker_or_command_line(run: Run) -> None:
     assert done.returncode == 0, done.stdout
 
 
-TAKES = f"marker cubestack takes {', '.join(KEYS)}, layout, firmware, semihosting, profile, set"
+TAKES = (
+    f"marker cubestack takes {', '.join(KEYS)}, layout, firmware, firmware_base, semihosting, "
+    "semihosting_root, profile, set"
+)
 WRONG_MARKERS = {
     "(3)": TAKES,
     "(sead=3)": TAKES,

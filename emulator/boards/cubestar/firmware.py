@@ -7,6 +7,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from typing import Unpack
 
 from cubestack.emulator.boards.contract import BoardOptions
@@ -124,6 +125,7 @@ class CubeStarFirmwareBoard(CubeStarStack):
                 "processor", "run" if awake else "sleep"
             ),
         )
+        self.processor.host.name = image.path.name if image.path else ""
         self.processor.fpga = self.engine
         self._serial = SerialWire(
             self.processor, wired.SATELLITE_UART.pin("TX"), wired.SATELLITE_UART.pin("RX")
@@ -142,11 +144,22 @@ class CubeStarFirmwareBoard(CubeStarStack):
     def connect_console(self, report: Callable[[str], None]) -> None:
         self.processor.console = self.processor.on_fault = report
 
+    def connect_program(
+        self, on_exit: Callable[[int], None], read: Callable[[int], bytes | None]
+    ) -> None:
+        self.processor.on_exit, self.processor.host.read = on_exit, read
+
+    def enable_semihosting(self, root: Path | None = None) -> None:
+        """Answer semihosting calls; the program may use files in ``root``, if any."""
+        self.machine.semihosting(True)
+        self.processor.host.root = root
+
     def reset_pin(self) -> None:
         self.processor.reset(ResetCause.EXTERNAL_PIN)
 
     def close(self) -> None:
         super().close()
+        self.processor.host.close()
         self.insight.close()
         self.machine.close()
 

@@ -13,6 +13,9 @@ from cubestack.emulator.iss.gdb.target import TARGET_XML, DebugTarget, Stop, Wat
 OK, ERROR, UNKNOWN = b"OK", b"E01", b""
 THREAD = b"1"
 
+BREAKPOINT_KINDS = 0, 1
+"""Software and hardware breakpoints: the same here, but set and removed independently."""
+
 WATCH_KINDS: dict[int, WatchKind] = {2: "write", 3: "read", 4: "access"}
 WATCH_WORDS: dict[WatchKind, str] = {"write": "watch", "read": "rwatch", "access": "awatch"}
 
@@ -39,6 +42,7 @@ class Session:
         self._awaiting = False  # the client waits for the target to stop
         self._last = b""
         self._flashed: dict[int, bytes] = {}
+        self._breakpoints: set[tuple[int, int]] = set()  # (kind of packet, address)
         target.attach()
 
     def receive(self, data: bytes) -> None:
@@ -173,8 +177,11 @@ class Session:
 
     def _point(self, text: str, on: bool) -> bytes:
         kind, address, count = (int(part, 16) for part in text.split(";")[0].split(","))
-        if kind in (0, 1):
-            self._target.set_breakpoint(address & ~1, on)
+        if kind in BREAKPOINT_KINDS:
+            address &= ~1
+            (self._breakpoints.add if on else self._breakpoints.discard)((kind, address))
+            wanted = any((one, address) in self._breakpoints for one in BREAKPOINT_KINDS)
+            self._target.set_breakpoint(address, wanted)
         elif kind in WATCH_KINDS:
             self._target.set_watchpoint(address, max(count, 1), WATCH_KINDS[kind], on)
         else:

@@ -85,7 +85,10 @@ class DebugTarget(Protocol):
         """Halt before the instruction there."""
 
     def set_watchpoint(self, address: int, count: int, kind: WatchKind, on: bool) -> None:
-        """Halt after an access to these bytes."""
+        """Halt before an instruction that accesses these bytes; the next step executes it.
+
+        GDB expects this of ARM: it steps, and shows the value before and after.
+        """
 
     def restart(self) -> None:
         """Reset, and halt before the first instruction."""

@@ -94,12 +94,23 @@ class Layout:
 
 
 @dataclass(frozen=True)
+class Core:
+    """A processor core, in the words of CMSIS-SVD's element "cpu"."""
+
+    name: str = "CM3"
+    revision: str = "r2p1"
+    has_mpu: bool = True
+    priority_bits: int = 3  #: implemented bits of an interrupt's priority
+
+
+@dataclass(frozen=True)
 class Processor:
     """A processor on its board, as firmware sees it."""
 
     name: str  #: of the part
     layouts: Sequence[Layout]  #: its registers
     pins_header: Callable[[], str]  #: writes the C header of its connections on the board
+    core: Core = Core()  #: EFM32GG Reference Manual, chapter 4
 
 
 def peripheral(

@@ -54,12 +54,14 @@ def test_program_breakpoint_stops_once(debugger: Debugger) -> None:
     assert run_on(debugger) == (CODE + 8, 6, False)
 
 
-def test_step_at_a_breakpoint_instruction_executes_the_next_one(debugger: Debugger) -> None:
+def test_step_at_a_breakpoint_instruction_executes_it_alone(debugger: Debugger) -> None:
     debugger.set_register("pc", CODE)
     run_on(debugger)
-    debugger.step(0, 0)
-    debugger.run(debugger.machine.now_ps + MS)
-    assert (debugger.register("pc"), debugger.register("r1")) == (CODE + 4, 5)
+    debugger.set_register("r1", 0)
+    for after, value in ((CODE + 2, 0), (CODE + 4, 5)):
+        debugger.step(0, 0)
+        debugger.run(debugger.machine.now_ps + MS)
+        assert (debugger.register("pc"), debugger.register("r1")) == (after, value)
     assert debugger.halted is not None
 
 

@@ -81,6 +81,17 @@ def test_exported_svd_is_valid_against_its_schema(tables) -> None:
 
 
 @EACH
+def test_svd_describes_the_core(device) -> None:
+    assert (str(device.cpu.name), device.cpu.revision, device.cpu.nvic_prio_bits) == (
+        str(type(device.cpu.name)("CM3")),
+        "r2p1",
+        3,
+    )
+    assert device.cpu.mpu_present
+    assert not device.cpu.fpu_present
+
+
+@EACH
 def test_parser_finds_every_register(tables, device) -> None:
     found = {
         (peripheral.name, register.name): (

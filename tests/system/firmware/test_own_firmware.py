@@ -12,6 +12,7 @@ from cubestack.host.emulation.emulated import AnyEmulated, open_device
 from cubestack.host.emulation.records import start_recorder
 from cubestack.host.recording.setups import emulated_setup
 from tests.emulator.boards.cubestar.builds import build, needs_toolchain
+from tests.emulator.iss.armv7m.thumb import Program
 
 pytestmark = [
     needs_toolchain,
@@ -197,7 +198,8 @@ def test_bad_image_prints_one_line(
 ) -> None:
     path = tmp_path / "none.bin"
     path.write_bytes(b"\xff" * 100)
-    assert main([command, "cubestar", "--firmware", str(path)]) == 2
+    options = ["--firmware", str(path), "--firmware-base", "0"]
+    assert main([command, "cubestar", *options]) == 2
     (error,) = capsys.readouterr().err.splitlines()
     assert error.startswith(f"cubestack {command}: {path}")
     assert "has no vector table" in error
@@ -206,3 +208,38 @@ def test_bad_image_prints_one_line(
 def test_custom_firmware_rejects_a_profile(elf: Path) -> None:
     with pytest.raises(ValueError, match="no profile and no switches"):
         cubestack.open_device("cubestar", firmware=str(elf), profile="extended")
+
+
+SYS_EXIT_EXTENDED = 0x20
+
+
+@pytest.fixture
+def exiting(tmp_path: Path) -> list[str]:
+    """Options for a program that exits with status 42."""
+    program = Program(
+        "ldr r0, =0x20000000; ldr r1, =0x20026; str r1, [r0]; ldr r0, =0x20000004; ldr r1, =42; "
+        f"str r1, [r0]; ldr r1, =0x20000000; ldr r0, ={SYS_EXIT_EXTENDED}; bkpt #0xAB; udf #0"
+    )
+    path = tmp_path / "exits.bin"
+    path.write_bytes(program.image)
+    return ["--firmware", str(path), "--firmware-base", "0", "--semihosting"]
+
+
+def test_exit_of_the_program_is_the_status_of_emulate(
+    exiting: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pty = ["--pty", str(tmp_path / "tty"), "--pace", "fast"]
+    assert main(["emulate", "cubestar", *exiting, *pty]) == 42
+    said = capsys.readouterr().err
+    assert "the program exited by semihosting with status 42" in said
+    assert "fault" not in said  # nothing ran after the call
+
+
+def test_exit_of_the_program_is_the_status_of_measure(exiting: list[str]) -> None:
+    with pytest.raises(SystemExit, match=r"^42$"):
+        main(["measure", "cubestar", *exiting])
+
+
+def test_semihosting_root_must_be_a_folder(elf: Path, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"none' is not a folder; create it$"):
+        open_device("cubestar", firmware=str(elf), semihosting_root=str(tmp_path / "none"))

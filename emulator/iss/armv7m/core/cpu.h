@@ -29,7 +29,7 @@ class Cpu;
 enum class Fault : uint8_t;    // system.h
 
 // How an access ended.
-enum class Result : uint8_t { Done, BusError, Violation, Unaligned };
+enum class Result : uint8_t { Done, BusError, Violation, Unaligned, Watched };
 
 // Why run() returned; several bits may be set.
 enum Exit : uint32_t {
@@ -38,7 +38,7 @@ enum Exit : uint32_t {
     ExitSleep = 4,          // asleep (System::sleep)
     ExitLockup = 8,         // System::locked_up
     ExitBreakpoint = 16,    // r[15] has a breakpoint; it was not executed
-    ExitWatchpoint = 32,    // the instruction before r[15] hit one: see watch_hit
+    ExitWatchpoint = 32,    // the instruction at r[15] is about to hit one: see watch_hit
     ExitStep = 64,          // the instructions of steps() are executed
 };
 
@@ -192,7 +192,13 @@ private:
     Code *code_of(const Region &region);
     const Region *find_region(uint32_t address, uint32_t size) const;
     void written(const uint8_t *host, uint32_t size);
-    void note_watch(uint32_t address, uint32_t size, uint32_t value, bool write);
+    bool note_watch(uint32_t address, uint32_t size, uint32_t value, bool write);
+    bool stops_at_watch(uint32_t address, uint32_t size, uint32_t value, bool write,
+                        uint64_t executed);
+    Result load_data(uint32_t address, uint32_t size, uint32_t &value, bool as_privileged,
+                     uint64_t executed);
+    Result store_data(uint32_t address, uint32_t size, uint32_t value, bool as_privileged,
+                      uint64_t executed);
     Result access(uint32_t address, uint32_t size, uint32_t &value, bool write, bool privileged);
     Result access_bit(uint32_t address, uint32_t size, uint32_t &value, bool write);
     Result access_pieces(uint32_t address, uint32_t size, uint32_t &value, bool write,
@@ -227,6 +233,10 @@ private:
     uint32_t exits = 0;
     uint32_t fault_address = 0;        // of the last access
     uint32_t stopped_at = NOWHERE, resume_at = NOWHERE;
+    // The instruction that a watchpoint stopped, and the number of those before it: when it runs
+    // again, it makes its accesses.
+    uint32_t watched_at = NOWHERE;
+    uint64_t watched_count = 0;
     int64_t steps_left = 0;
     uint32_t step_low = 0, step_high = 0;
 

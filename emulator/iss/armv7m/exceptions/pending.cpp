@@ -131,8 +131,8 @@ bool System::fault(Fault kind, uint32_t address) {
 void System::svc() { pend_synchronous(SVCALL); }
 
 bool System::bkpt(uint32_t immediate) {
-    if (semihosting && immediate == 0xAB) {
-        semihost();
+    if (semihosting && immediate == 0xAB && listener.semihosting(cpu.r[0], cpu.r[1])) {
+        cpu.stop();
         return true;
     }
     if (debugger) {

@@ -269,6 +269,9 @@ far:
     instructions += count;
     return;
 
+watched:    // The instruction runs later, from here, with the same cycles.
+    r[15] = PC, cycles = now - op->stall;
+    if (op == it_operation) it = it_before;
 failed:    // System or run() set r[15]
     attention_requested = true;
     instructions += count;

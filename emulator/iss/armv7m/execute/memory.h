@@ -19,15 +19,19 @@
 #define KEEP_SP(number, value) ((number) == 13 ? (value) & ~3u : (value))
 #define LOAD_OR_FAIL(address, bytes, value, privilege) \
     do { \
-        const Result result = load((address), (bytes), (value), (privilege)); \
+        const Result result = \
+            load_data((address), (bytes), (value), (privilege), instructions + count); \
         if (UNLIKELY(result != Result::Done)) { \
+            if (result == Result::Watched) goto watched; \
             if (abandon(op, result, false)) goto failed; \
             (value) = 0;    /* an ignored bus fault: the value is UNKNOWN */ \
         } \
     } while (0)
 #define STORE_OR_FAIL(address, bytes, value, privilege) \
     do { \
-        const Result result = store((address), (bytes), (value), (privilege)); \
+        const Result result = \
+            store_data((address), (bytes), (value), (privilege), instructions + count); \
+        if (UNLIKELY(result == Result::Watched)) goto watched; \
         if (UNLIKELY(result != Result::Done) && abandon(op, result, true)) goto failed; \
     } while (0)
 
@@ -70,7 +74,9 @@
         } else { \
             const int64_t data_phase = now + 1; \
             r[15] = PC, cycles = data_phase; \
-            const Result result = store((address), bytes, (value), privileged()); \
+            const Result result = \
+                store_data((address), bytes, (value), privileged(), instructions + count); \
+            if (UNLIKELY(result == Result::Watched)) goto watched; \
             bus_free = cycles + 1; \
             if (UNLIKELY(result != Result::Done) && abandon(op, result, true)) goto failed; \
             cycles = data_phase; \
@@ -151,11 +157,18 @@ HANDLE(STORE_USER) {
     WAIT_FOR_STORE();
     r[15] = PC, cycles = now + 1;
     const uint32_t content = op->a == 4 ? r[op->d] : r[op->d] & ((1u << 8 * op->a) - 1);
-    const Result result = store(address, op->a, content, false);
+    const Result result = store_data(address, op->a, content, false, instructions + count);
+    if (UNLIKELY(result == Result::Watched)) goto watched;
     bus_free = cycles + 1;
     if (UNLIKELY(result != Result::Done) && abandon(op, result, true)) goto failed;
     NEXT(1);
 }
+
+// A watchpoint at any word stops before the first access.
+#define STOP_AT_WATCH(address, words, value, write) \
+    for (uint32_t i = 0; i < (words) && !watches.empty(); i++) \
+        if (stops_at_watch((address) + 4 * i, 4, (value), write, instructions + count)) \
+            goto watched;
 
 // LDM, POP: all registers are written at the end, so that a fault changes none. (The processor
 // restarts an LDM that is interrupted; here the interrupt waits for its end.)
@@ -178,6 +191,7 @@ HANDLE(LDM) {
         now += 1 + (int64_t)registers * (1 + page.read_wait);
     } else {
         r[15] = PC, cycles = now + 1;
+        STOP_AT_WATCH(address, registers, 0, false)
         for (uint32_t i = 0; i < registers; i++) {
             LOAD_OR_FAIL(address + 4 * i, 4, contents[i], privileged());
             cycles++;
@@ -206,6 +220,7 @@ HANDLE(STM) {
         now += 1 + (int64_t)registers * (1 + page.write_wait);
     } else {
         r[15] = PC, cycles = now + 1;
+        STOP_AT_WATCH(address, registers, contents[i], true)
         for (uint32_t i = 0; i < registers; i++) {
             STORE_OR_FAIL(address + 4 * i, 4, contents[i], privileged());
             cycles++;
@@ -223,6 +238,7 @@ HANDLE(LDRD) {
     WAIT_FOR_BUS();
     r[15] = PC, cycles = now + 1;
     uint32_t low, high;
+    STOP_AT_WATCH(address, 2, 0, false)
     LOAD_OR_FAIL(address, 4, low, privileged());
     cycles++;
     LOAD_OR_FAIL(address + 4, 4, high, privileged());
@@ -237,6 +253,7 @@ HANDLE(STRD) {
     if (UNLIKELY(address & 3)) FAIL(Fault::Unaligned);
     WAIT_FOR_BUS();
     r[15] = PC, cycles = now + 1;
+    STOP_AT_WATCH(address, 2, r[i ? op->a : op->d], true)
     STORE_OR_FAIL(address, 4, r[op->d], privileged());
     cycles++;
     STORE_OR_FAIL(address + 4, 4, r[op->a], privileged());

@@ -103,15 +103,40 @@ void Cpu::invalidate(uint32_t address, uint32_t size) {
     }
 }
 
-void Cpu::note_watch(uint32_t address, uint32_t size, uint32_t value, bool write) {
+bool Cpu::note_watch(uint32_t address, uint32_t size, uint32_t value, bool write) {
     for (const Watch &watch : watches) {
         if (address >= watch.address + watch.size || watch.address >= address + size) continue;
         if (!(write ? watch.on_write : watch.on_read)) continue;
         watch_hit = {r[15], address, size, value, write};
         exits |= ExitWatchpoint;
         limit = INT64_MIN;
-        return;
+        return true;
     }
+    return false;
+}
+
+// Whether a watchpoint stops the running instruction before this access. `executed`: instructions
+// before it.
+bool Cpu::stops_at_watch(uint32_t address, uint32_t size, uint32_t value, bool write,
+                         uint64_t executed) {
+    if (watches.empty() || (watched_at == r[15] && watched_count == executed)) return false;
+    if (!write) peek(address, size, value);
+    if (!note_watch(address, size, value, write)) return false;
+    watched_at = r[15], watched_count = executed;
+    return true;
+}
+
+// The accesses of instructions: a watchpoint stops before them.
+Result Cpu::load_data(uint32_t address, uint32_t size, uint32_t &value, bool as_privileged,
+                      uint64_t executed) {
+    if (stops_at_watch(address, size, 0, false, executed)) return Result::Watched;
+    return access_pieces(address, size, value, false, as_privileged);
+}
+
+Result Cpu::store_data(uint32_t address, uint32_t size, uint32_t value, bool as_privileged,
+                       uint64_t executed) {
+    if (stops_at_watch(address, size, value, true, executed)) return Result::Watched;
+    return access_pieces(address, size, value, true, as_privileged);
 }
 
 // An aligned access; writes `value` or sets it.

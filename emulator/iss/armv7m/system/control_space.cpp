@@ -123,7 +123,7 @@ bool System::read_word(uint32_t address, bool look, uint32_t &value) {
         case SCS_ICTR: value = (uint32_t)(parameters.interrupts - 1) / 32; break;
         case SCS_ACTLR: value = actlr; break;
         case SCS_DHCSR:
-            value = (debugger ? 1u : 0u) | 1u << 16 | (sleeping != Sleep::Awake ? 1u << 18 : 0u) |
+            value = (debugger || semihosting ? 1u : 0u) | 1u << 16 | (sleeping != Sleep::Awake ? 1u << 18 : 0u) |
                     (lockup ? 1u << 19 : 0u) | 1u << 24;
             break;
         case SCS_DCRDR: value = dcrdr; break;

@@ -82,13 +82,12 @@ public:
     // In the middle of an exception's entry or return: perform all events up to cpu.cycles, so that
     // a late interrupt is seen.
     virtual void catch_up() {}
-    virtual int64_t time_ps() { return 0; }
     virtual void itm(int port, uint32_t value, int bytes) { (void)port, (void)value, (void)bytes; }
-    virtual void semihosting_write(int handle, const uint8_t *text, int length) {
-        (void)handle, (void)text, (void)length;
+    // A call of the host by BKPT 0xAB. True: it will be answered, in r0, before the next
+    // instruction runs. False: the BKPT is an ordinary one.
+    virtual bool semihosting(uint32_t operation, uint32_t parameter) {
+        return (void)operation, (void)parameter, false;
     }
-    virtual int semihosting_read() { return -1; }                  // a character; -1: end of input
-    virtual void semihosting_exit(uint32_t code) { (void)code; }   // the program ended
     virtual void unmodelled(const char *what) { (void)what; }
 };
 
@@ -149,7 +148,7 @@ public:
 
     // --- for debuggers and reports ------------------------------------------------------------
 
-    // With a debugger attached DHCSR.C_DEBUGEN reads 1, and BKPT and the exceptions selected in
+    // With a debugger or a semihosting host DHCSR.C_DEBUGEN reads 1. With a debugger BKPT and the exceptions selected in
     // `catches` (as DEMCR.VC_*) stop the core; stopped_by() has the reason.
     void set_debugger(bool attached, uint32_t catches = 0);
     enum class DebugStop : uint8_t { None, Breakpoint, VectorCatch };
@@ -210,9 +209,6 @@ private:
     void write_shcsr(uint32_t value);
     void write_demcr(uint32_t value);
     bool user_may(uint32_t address, bool write) const;
-
-    // debug/semihosting.cpp
-    void semihost();
 
     Cpu &cpu;
     SystemListener &listener;

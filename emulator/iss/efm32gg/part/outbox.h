@@ -17,13 +17,13 @@ enum class Kind : int32_t {
     I2C_STOP,     // master
     I2C_SLAVE,    // value: answer of the slave
     ITM,          // unit: port; value; extra: size
-    SEMIHOSTING,  // text
+    SEMIHOSTING,  // a call of the host, which must answer it; unit: operation; value: parameter
     LOG,          // text: something not modelled or used wrongly; each text once
     RESET,        // the part was reset; value: RMU's cause bits; text: an unexpected cause
     SLEEP,        // value: energy mode 1..4, 0: awake
     FLASH,        // value: address; unit 0: written, extra: bytes; 1: erased, extra: wear or bytes
     SPI,          // a word begins; unit; value: bits; extra: duration in ps
-    FAULT,        // the program ended or cannot continue; text
+    FAULT,        // the program cannot continue; text
 };
 
 struct Outgoing {

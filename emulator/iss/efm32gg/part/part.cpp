@@ -88,7 +88,7 @@ void Part::perform_reset() {
     const uint32_t cold = rmu::RSTCAUSE_PORST | rmu::RSTCAUSE_BODUNREGRST | rmu::RSTCAUSE_BODREGRST;
     const int64_t time = now();
     each([](Peripheral &one) { one.clocks_changing(); });
-    asleep = locked = hung = false;
+    asleep = locked = hung = calling = false;
     mode = 0;
     stalled_until = owed_cycles = 0;
     rmu->caused(reset_cause);
@@ -149,19 +149,14 @@ void Part::itm(int port, uint32_t value, int bytes) {
         stop_wanted = true, cpu.stop();
 }
 
-void Part::semihosting_write(int handle, const uint8_t *text, int length) {
-    for (int at = 0; at < length;) {
-        Outgoing &item = send(Kind::SEMIHOSTING, handle, 0);
-        const int part = std::min<int>(length - at, sizeof item.text - 1);
-        std::memcpy(item.text, text + at, (size_t)part);
-        item.value = part;
-        at += part;
-    }
+bool Part::semihosting(uint32_t operation, uint32_t parameter) {
+    send(Kind::SEMIHOSTING, (int)operation, parameter);
+    return calling = true;
 }
 
-void Part::semihosting_exit(uint32_t code) {
-    std::snprintf(send(Kind::FAULT, 0, code).text, sizeof Outgoing::text,
-                  "the program exited by semihosting with code %u", (unsigned)code);
+void Part::answer_call(uint32_t result) {
+    if (std::exchange(calling, false))
+        cpu.r[0] = result;
 }
 
 }  // namespace efm32gg

@@ -154,6 +154,8 @@ public:
     Outgoing &send(Kind kind, int unit, int64_t value, int64_t extra = 0, bool stop = true);
     // Reports each text once.
     void log_once(const char *format, ...) __attribute__((format(printf, 2, 3)));
+    // The host's answer to a semihosting call; until then nothing runs and no time passes.
+    void answer_call(uint32_t result);
     void analog_changed();
     double volts(int input) const { return memories.analog ? memories.analog[input] : 0; }
     // `flags`: bit 0 framing error, bit 1 parity error; from bit 8 the line's bit rate, 0: unknown.
@@ -165,8 +167,7 @@ public:
     void reset_requested() override;
     void locked_up() override;
     void itm(int port, uint32_t value, int bytes) override;
-    void semihosting_write(int handle, const uint8_t *text, int length) override;
-    void semihosting_exit(uint32_t code) override;
+    bool semihosting(uint32_t operation, uint32_t parameter) override;
     void unmodelled(const char *what) override { log_once("%s is not modelled", what); }
 
     // -- peripherals that others access --
@@ -204,7 +205,8 @@ private:
     int64_t stalled_until = 0;     // end of the wait for the flash
     int64_t standing_now = 0;      // current time while the clock is stopped
     int64_t owed_cycles = 0;       // cycles counted during the stop, to be spent when it runs
-    bool standing = true, stop_wanted = false, asleep = false, locked = false;
+    bool standing = true, stop_wanted = false, asleep = false, locked = false,
+         calling = false;
     uint32_t wanted_reset = 0;
     int slow_ratio = 1;            // HFCORECLK to HFPERCLK
     std::vector<std::unique_ptr<Peripheral>> owned;

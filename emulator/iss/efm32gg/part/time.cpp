@@ -102,6 +102,10 @@ int64_t Part::run(int64_t until) {
             exits |= stop_wanted ? ExitOutbox : (uint32_t)armv7m::ExitDeadline;
             break;
         }
+        if (calling) {
+            exits |= ExitOutbox;
+            break;
+        }
         const int64_t next = std::min(until, events.next_time());
         if (hung) {
             if (next == NEVER) break;

@@ -21,9 +21,7 @@ LINE_HIGH, LINE_LOW, PULSE, NMI = range(4)
 
 REGISTERS = {
     name: number
-    for number, name in enumerate(
-        (*CORE, "sleep", "locked", "priority", "resets", "exit_code", "debug_stop")
-    )
+    for number, name in enumerate((*CORE, "sleep", "locked", "priority", "resets", "debug_stop"))
 }
 
 SYSTEM = {
@@ -56,7 +54,7 @@ class Entry(ctypes.Structure):
 
 _P, _I, _U, _L = ctypes.c_void_p, ctypes.c_int32, ctypes.c_uint32, ctypes.c_int64
 _FUNCTIONS = {
-    "new": (_P, (_I, _I, _I, _L, _L)), "delete": (None, (_P,)), "reset": (None, (_P, _I)),
+    "new": (_P, (_I, _I, _L, _L)), "delete": (None, (_P,)), "reset": (None, (_P, _I)),
     "code": (_P, (_P,)), "ram": (_P, (_P,)), "run": (_U, (_P, _L)), "at": (None, (_P, _L, _I, _I)),
     "get": (_U, (_P, _I)), "set": (None, (_P, _I, _U)), "cycles": (_L, (_P,)),
     "set_cycles": (None, (_P, _L)), "next_cycle": (_L, (_P,)), "service": (None, (_P,)),
@@ -98,11 +96,10 @@ class Bench:
         program: str | Program = "",
         interrupts: int = 39,
         priority_bits: int = 3,
-        semihosting: bool = False,
         reference: tuple[int, int] = (0, 1),
     ) -> None:
         self._library = _library()
-        self._bench = self._library.bench_new(interrupts, priority_bits, semihosting, *reference)
+        self._bench = self._library.bench_new(interrupts, priority_bits, *reference)
         memory = ctypes.c_uint8 * (1 << 16)
         self.code = memory.from_address(self._library.bench_code(self._bench))
         self.ram = memory.from_address(self._library.bench_ram(self._bench))
@@ -150,7 +147,7 @@ class Bench:
 
     @property
     def text(self) -> str:
-        """Text by semihosting, and by the ITM as ``<port:value/bytes>``."""
+        """Writes to the ITM as ``<port:value/bytes>``."""
         return self._library.bench_text(self._bench).decode()
 
     @property

@@ -35,7 +35,7 @@ struct Bench : Bus, SystemListener {
     std::vector<BenchEvent> events;    // the latest first
     std::vector<LogEntry> log;
     std::string text;
-    int32_t resets = 0, exit_code = -1;
+    int32_t resets = 0;
 
     explicit Bench(const SystemParameters &parameters)
         : code(CODE_SIZE), ram(RAM_SIZE), cpu(*this), system(cpu, parameters, *this) {
@@ -78,17 +78,10 @@ struct Bench : Bus, SystemListener {
 
     void catch_up() override { fire(); }
     void reset_requested() override { resets++; }
-    int64_t time_ps() override { return cpu.cycles * 20'000; }
     void itm(int port, uint32_t value, int bytes) override {
         text += "<" + std::to_string(port) + ":" + std::to_string(value) + "/" +
                 std::to_string(bytes) + ">";
     }
-    void semihosting_write(int handle, const uint8_t *characters, int length) override {
-        if (handle == 3) text += "!";
-        text.append((const char *)characters, (size_t)length);
-    }
-    int semihosting_read() override { return '?'; }
-    void semihosting_exit(uint32_t value) override { exit_code = (int32_t)value; }
 
     uint32_t run(int64_t until) {
         for (;;) {
@@ -109,11 +102,10 @@ struct Bench : Bus, SystemListener {
 
 extern "C" {
 
-Bench *bench_new(int32_t interrupts, int32_t priority_bits, int32_t semihosting, int64_t cycles,
-                 int64_t ticks) {
+Bench *bench_new(int32_t interrupts, int32_t priority_bits, int64_t cycles, int64_t ticks) {
     SystemParameters parameters;
     parameters.interrupts = interrupts, parameters.priority_bits = priority_bits;
-    parameters.semihosting = semihosting, parameters.trace_probe = false;
+    parameters.trace_probe = false;
     parameters.reference_cycles = cycles, parameters.reference_ticks = ticks;
     return new Bench(parameters);
 }
@@ -142,8 +134,7 @@ uint32_t bench_get(Bench *bench, int32_t which) {
     case 24: return bench->system.locked_up();
     case 25: return (uint32_t)bench->system.execution_priority();
     case 26: return (uint32_t)bench->resets;
-    case 27: return (uint32_t)bench->exit_code;
-    case 28: return (uint32_t)bench->system.stopped_by();
+    case 27: return (uint32_t)bench->system.stopped_by();
     default: return bench->cpu.debug_register(which);
     }
 }

@@ -302,7 +302,7 @@ def test_slices_and_steps_change_no_cycle(load: Load, part: bool) -> None:
     assert state(plain) == state(sliced) == state(stepped)
 
 
-def test_watchpoints_stop_after_the_access(load: Load) -> None:
+def test_watchpoints_stop_before_the_instruction_that_accesses(load: Load) -> None:
     text = "ldr r0, [r1]\n strb r2, [r1, #3]\n str r2, [r1, #4]\n push {r0, r1}\n nop"
     machine = load(text, r1=DATA, r2=7, sp=DATA + 16)
     watches = Watch(DATA + 3, 1, "w"), Watch(DATA + 12, 4, "a")
@@ -311,9 +311,11 @@ def test_watchpoints_stop_after_the_access(load: Load) -> None:
     assert machine.run(FAR).reason == StopReason.WATCHPOINT
     hit = machine.watch_hit
     assert (hit.pc, hit.address, hit.size, hit.write) == (CODE + 2, DATA + 3, 1, True)
-    assert machine.register("pc") == CODE + 4
+    assert machine.register("pc") == CODE + 2
+    assert machine.peek(DATA + 3, 1) != b"\7"
     assert machine.run(FAR).reason == StopReason.WATCHPOINT
-    assert (machine.watch_hit.address, machine.register("pc")) == (DATA + 12, CODE + 8)
+    assert machine.peek(DATA + 3, 1) == b"\7"
+    assert (machine.watch_hit.address, machine.register("pc")) == (DATA + 12, CODE + 6)
     for watch in watches:
         machine.watch(watch, on=False)
     assert machine.run(machine.now_ps + 2_000_000).reason == StopReason.TIME

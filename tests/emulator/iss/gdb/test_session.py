@@ -163,6 +163,17 @@ def test_stop_reply_has_watchpoint_and_signal(talk: Talk, stop: Stop, text: byte
     assert text in (talk.answer() or b"")
 
 
+@pytest.mark.parametrize(("first", "second"), [(0, 1), (1, 0)])
+def test_removing_one_of_two_breakpoints_at_an_address_keeps_the_other(
+    talk: Talk, first: int, second: int
+) -> None:
+    for packet in (f"Z{first},100,2", f"Z{second},101,2", f"z{first},100,2"):
+        assert talk.ask(packet) == b"OK"
+    assert talk.target.calls[-1] == ("breakpoint", 0x100, True)
+    assert talk.ask(f"z{second},100,2") == b"OK"
+    assert talk.target.calls[-1] == ("breakpoint", 0x100, False)
+
+
 def test_breakpoints_and_watchpoints_are_set_and_removed(talk: Talk) -> None:
     packets = ("Z0,101,2", "z0,100,2", "Z1,200,2", "Z2,20000000,4", "Z3,20000000,4", "z4,1,0")
     assert [talk.ask(packet) for packet in packets] == [b"OK"] * 6
