@@ -17,6 +17,8 @@ START_UP = 163 * US
 LOOP, WFI = 0xE7FE, 0xBF30
 POWER_ON, PIN_RESET, WATCHDOG, LOCK_UP, SYSTEM_REQUEST = 0x1, 0x8, 0x10, 0x20, 0x40
 _ENTRY = 0x100
+MOST_STANDING = 100
+"""Runs in succession at the same time."""
 
 
 @cache
@@ -96,7 +98,10 @@ class Bench:
 
     def run_until(self, time_ps: int) -> None:
         """Run and collect messages."""
+        standing, before = 0, -1
         for _ in range(100_000):
+            standing, before = standing + 1 if before == self.now else 0, self.now
+            assert standing < MOST_STANDING, "time stands still"
             done = self.machine.now_ps >= time_ps
             if not done:
                 self.machine.run(time_ps)
