@@ -9,6 +9,7 @@ from cubestack.emulator.iss.insight.fault_report import fault_report
 from cubestack.emulator.iss.insight.symbols import Symbols
 from cubestack.emulator.iss.machine import Machine
 from cubestack.emulator.rtl.contract import RtlEngine
+from cubestack.emulator.sim import debugger_commands
 from cubestack.emulator.sim.power import PowerModel
 from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
 from cubestack.firmware_model.interface.efm32gg import LAYOUTS
@@ -151,7 +152,7 @@ class Monitor:
         """Output of the command ``words``; ValueError for an invalid one."""
         command = self._commands.get(words[0])
         if command is None:
-            known = ", ".join(["halt", "resume", "reset", "reg", "mdw", "catch", *self._commands])
+            known = ", ".join([*debugger_commands.KNOWN, *self._commands])
             raise ValueError(f"no command {words[0]!r}; known: {known}")
         return command(words[1:])
 

@@ -157,6 +157,9 @@ _COMMANDS: Mapping[str, Callable[[Processor, list[str]], str]] = {
     "semihosting": _semihosting,
 }
 
+KNOWN = ("catch", *_COMMANDS, "mdw", "mww")
+"""Names to suggest for an unknown command."""
+
 
 def perform(target: Processor, words: list[str]) -> str | None:
     """Output of a command; None if it is none of these. Raises ValueError for invalid words."""
