@@ -7,6 +7,7 @@ from pathlib import Path
 
 from cubestack.hdl.blocks.pinned import PinnedComponent
 from cubestack.hdl.contract.contract import Contract, Size
+from cubestack.hdl.contract.image import load_image
 from cubestack.hdl.flow.generate import rtlil_text, verilog_text
 from cubestack.hdl.flow.tools import yosys_files
 from cubestack.hdl.user import GatewareError, load_gateware
@@ -22,12 +23,23 @@ write_verilog -noattr dut.v
 
 @dataclass(frozen=True)
 class Design:
-    """``text`` as for ``hdl.user.load_gateware``; the shipped design without one."""
+    """``text`` as for ``hdl.user.load_gateware``; the shipped design without one.
+
+    ``image`` is the module that says what it keeps of a frame; see :mod:`.image`.
+    """
 
     contract: Contract
     text: str = ""
     parameters: Mapping[str, int | str] | None = None
     folder: Path | None = None
+    image: str = ""
+
+    def check_image(self) -> None:
+        """Raise GatewareError if ``image`` is no such module, or cannot be used."""
+        if self.image and not self.sized:
+            names = " and ".join(self.contract.parameters(self.contract.full))
+            raise GatewareError(f"--image {self.image}: {self.title} has no parameters {names}")
+        load_image(self.image, *self.contract.proof, self.folder)
 
     @property
     def title(self) -> str:

@@ -13,6 +13,7 @@ from time import monotonic
 from typing import TYPE_CHECKING, NamedTuple
 from xml.etree import ElementTree
 
+from cubestack.hdl.contract import image
 from cubestack.hdl.contract.contract import FULL, QUICK, Check, Contract, Size
 from cubestack.hdl.contract.design import Design
 from cubestack.hdl.contract.points import Coverage, Point
@@ -95,7 +96,7 @@ def plan(design: Design, tier: str, seed: int, text: str = "") -> list[Run]:
     seeds = SEEDS[tier] if design.sized else SEEDS[QUICK]
     runs = [Run(size, seed + n, plain, None) for size in sizes for n in seeds if plain]
     for name, check in checks.items():
-        if check.harness:
+        if check.harness and not design.image:
             runs.append(Run(contract.full, seed + SEEDS[QUICK][0], (name,), check.harness))
     return runs
 
@@ -116,6 +117,7 @@ def run_checks(
     ValueError.
     """
     check_tools(simulator)
+    design.check_image()
     runs = plan(design, tier, seed, text)
     report = Report(design.title, seed, tier)
     with tempfile.TemporaryDirectory() as name:
@@ -207,6 +209,8 @@ class _Bench:
                     **simulator.frame_environment(*run.size),
                     "HDL_COVERAGE": "" if waveform else str(self._folder / "points"),
                     "CONTRACT_PROGRESS": str(noted),
+                    image.MODULE: self._design.image,
+                    image.FOLDER: str((self._design.folder or Path()).resolve()),
                     "COCOTB_REWRITE_ASSERTION_FILES": "",  # an error is the requirement in words
                 },
                 simulator=self._simulator,

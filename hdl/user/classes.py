@@ -28,12 +28,14 @@ def make_component(
         for parameter in inspect.signature(kind).parameters.values()
         if parameter.kind not in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD)
     ]
+    # Verilog's ROWS is usually rows in Python.
+    names = {parameter.lower(): parameter for parameter in known}
     for parameter in parameters:
-        if parameter not in known:
+        if parameter.lower() not in names:
             words = ", ".join(known) or "none"
             raise GatewareError(f"{name}: no parameter {parameter}; parameters: {words}")
     try:
-        component = kind(**parameters)
+        component = kind(**{names[key.lower()]: value for key, value in parameters.items()})
         Fragment.get(component, None)
     except Exception as error:
         raise GatewareError(f"{name}: {type(error).__name__}: {error}") from error

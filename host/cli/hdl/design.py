@@ -21,9 +21,10 @@ def add_design(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def design_of(args: argparse.Namespace, text: str) -> Design:
+def design_of(args: argparse.Namespace, text: str, image: str = "") -> Design:
     """The design that is checked; ValueError for a device without a contract."""
-    return Design(_contract(args.device), text, dict(map(_parameter, args.gateware_param)))
+    parameters = dict(map(_parameter, args.gateware_param))
+    return Design(_contract(args.device), text, parameters, image=image)
 
 
 def _contract(name: str | None) -> Contract:

@@ -33,6 +33,7 @@ examples:
   cubestack hdl test design.v --device DEVICE
   cubestack hdl test design.v:my_top --device DEVICE --tier full --seed 7
   cubestack hdl test my_module:MyTop --device DEVICE -k bank
+  cubestack hdl test my_module:Binned --device DEVICE --image my_module
   cubestack hdl test --device DEVICE --junit out/contract.xml"""
 
 
@@ -43,6 +44,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--tier", choices=TIERS, default=QUICK, help="full: more sizes and seeds; default: quick"
     )
     parser.add_argument("-k", dest="text", metavar="TEXT", default="", help="part of tests' names")
+    parser.add_argument(
+        "--image",
+        metavar="MODULE",
+        default="",
+        help="says what the design keeps of a frame (docs/how-to/change-the-gateware.md)",
+    )
     add_value(parser, "seed", whole(0, "added to the seeds of all tests", 0))
     add_path(parser, "--junit", "write the results as JUnit's XML")
     parser.add_argument(
@@ -59,7 +66,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    design = design_of(args, args.file)
+    design = design_of(args, args.file, args.image)
     told = (lambda *_: None) if args.json else _tell
     report = run_checks(
         design,
