@@ -56,5 +56,5 @@ def test_wrong_module_is_one_line(tmp_path: Path, name: str, text: str, message:
 def test_design_of_one_size_needs_parameters_for_an_image():
     design = Design(CONTRACT, "a.v", image="binned")
     design.__dict__["sized"] = False
-    with pytest.raises(GatewareError, match="--image binned: a.v has no parameters COLUMNS and"):
+    with pytest.raises(GatewareError, match=r"--image binned: a\.v has no parameters COLUMNS and"):
         design.check_image()
