@@ -5,10 +5,8 @@ reads an image of the usual size. The part has no block RAM, so a block's upper 
 SRAM: it is read back while the lower left pixel arrives.
 """
 
-import numpy as np
 from amaranth.hdl import Cat, ClockDomain, ClockSignal, Const, Module, Mux, Signal
 from amaranth.utils import ceil_log2
-from numpy.typing import NDArray
 
 from cubestack.hdl.cubestar.top import CubeStarTop
 
@@ -46,16 +44,17 @@ class Binned(CubeStarTop):
         return m
 
 
-def stored(frame: NDArray[np.uint8]) -> NDArray[np.int64]:
+def stored(frame: list[list[int]]) -> list[list[int]]:
     """What a frame leaves in the memory; -1 where nothing is written."""
-    wide = frame.astype(np.int64)
-    rows = (wide[:, ::2] + wide[:, 1::2]) >> 1
-    memory = np.full(frame.shape, -1)
-    memory[: len(frame) // 2, : len(frame[0]) // 2] = (rows[::2] + rows[1::2]) >> 1
+    memory = [[-1] * len(row) for row in frame]
+    for y in range(0, len(frame), 2):
+        for x in range(0, len(frame[0]), 2):
+            upper, lower = (sum(row[x : x + 2]) >> 1 for row in frame[y : y + 2])
+            memory[y // 2][x // 2] = (upper + lower) >> 1
     return memory
 
 
-def presented(memory: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def presented(memory: list[list[int]]) -> list[list[int]]:
     """What the data clocks present of the memory."""
-    quarter = memory[: len(memory) // 2, : len(memory[0]) // 2]
-    return quarter.repeat(2, 0).repeat(2, 1)
+    columns = range(len(memory[0]))
+    return [[memory[y // 2][x // 2] for x in columns] for y in range(len(memory))]

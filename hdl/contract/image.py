@@ -3,20 +3,20 @@
 The shipped designs keep and present the frame as it is. For a design that changes the image, a
 module of the user's says what is right:
 
-- ``stored(frame)``: of a frame, uint8 of shape (rows, columns), the bank's bytes in the same
-  layout, integers; -1 where nothing is stored.
+- ``stored(frame)``: of a frame, a list of rows of pixels, the bank's bytes in the same layout;
+  -1 where nothing is stored.
 - ``presented(memory)``: of a bank's bytes, in that layout, what the data clocks present.
+
+Both may return anything with rows of integers, also a NumPy array.
 """
 
 import os
 import sys
 from dataclasses import dataclass
 from importlib import import_module
+from operator import index
 from pathlib import Path
 from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from cubestack.hdl.user import GatewareError
 
@@ -47,16 +47,20 @@ class Image:
         return all(level in (-1, byte) for level, byte in zip(wanted, memory, strict=False))
 
     def _called(self, name: str, content: bytes, least: int) -> list[int]:
-        shape = self.rows, self.columns
-        frame = np.frombuffer(content, np.uint8).reshape(shape)
-        found: NDArray[np.int64] = np.asarray(getattr(self.module, name)(frame))
-        low, high = int(found.min()), int(found.max())
-        if found.shape != shape or found.dtype.kind not in "iu" or low < least or high > 255:
+        starts = range(0, len(content), self.columns)
+        rows = [[*content[start : start + self.columns]] for start in starts]
+        returned = getattr(self.module, name)(rows)
+        try:
+            found = [[index(level) for level in row] for row in returned]
+        except TypeError:
+            found = []
+        wrong = len(found) != self.rows or any(len(row) != self.columns for row in found)
+        if wrong or any(not least <= level <= 255 for row in found for level in row):
             raise GatewareError(
-                f"{self.module.__name__}.{name} must return integers from {least} to 255 of shape "
-                f"{shape}, not {found.dtype} from {low} to {high} of shape {found.shape}"
+                f"{self.module.__name__}.{name} must return {self.rows} rows of {self.columns} "
+                f"integers from {least} to 255"
             )
-        return [*map(int, found.ravel())]
+        return [level for row in found for level in row]
 
 
 def load_image(name: str, columns: int, rows: int, folder: Path | None = None) -> Image:

@@ -10,9 +10,8 @@ from cubestack.hdl.contract.image import load_image
 from cubestack.hdl.user import GatewareError
 
 UPSIDE_DOWN = """
-import numpy as np
 def stored(frame):
-    return frame[::-1].astype(int)
+    return [[int(pixel) for pixel in row] for row in frame[::-1]]
 def presented(memory):
     return memory[::-1]
 """
@@ -43,9 +42,13 @@ def test_shipped_image_is_the_frame():
     [
         ("no_stored", "", "--image no_stored: the module has no function stored"),
         ("raises", "import nothing_here", "--image raises: ModuleNotFoundError: No module named"),
-        ("floats", UPSIDE_DOWN.replace("int", "float"), "floats.stored must return integers"),
-        ("far", UPSIDE_DOWN.replace("(int)", "(int) + 256"), r"from -1 to 255 of shape \(2, 4\)"),
-        ("flat", UPSIDE_DOWN.replace("memory[", "memory[0, "), "not uint8 from"),
+        ("floats", UPSIDE_DOWN.replace("int", "float"), "floats.stored must return 2 rows of 4"),
+        ("far", UPSIDE_DOWN.replace("int(", "256 + int("), "integers from -1 to 255"),
+        (
+            "flat",
+            UPSIDE_DOWN.replace("memory[:", "memory[0][:"),
+            "flat.presented must return 2 rows",
+        ),
     ],
 )
 def test_wrong_module_is_one_line(tmp_path: Path, name: str, text: str, message: str):
