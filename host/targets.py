@@ -21,8 +21,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cubestack.firmware_model.formats.recording import load_recording
+from cubestack.firmware_model.interface.codec.field import InterfaceError
 from cubestack.firmware_model.interface.codec.message import Interface
+from cubestack.firmware_model.interface.codec.node_messages import IDENTIFICATION
 from cubestack.host.clients.contract import Client
+from cubestack.host.clients.diagnosis import node_type_of, node_type_on
 from cubestack.host.clients.i2c import I2cBus, I2cClient
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.clients.registers import RegisterClient, RegisterLine
@@ -32,7 +35,7 @@ from cubestack.host.emulation.controls import Controls, EmulatedControls
 from cubestack.host.emulation.emulated import node_client, open_device
 from cubestack.host.emulation.records import create_file, start_recorder
 from cubestack.host.emulation.remote_controls import controlled
-from cubestack.host.errors import PortOpenError, TargetError
+from cubestack.host.errors import NodeError, PortOpenError, TargetError
 from cubestack.host.recording.host_recorder import HostRecorder
 from cubestack.host.recording.playback import RecordedI2c, RecordedTransport
 from cubestack.host.recording.setups import emulated_setup, taped_setup
@@ -196,18 +199,48 @@ def _open_real(
             raise TargetError(f"{found.title} has no registers on a UART: leave out --backup")
         baud = baud or (registers and registers.baud) or found.interface.baud
         line = open_transport(text, baud)
-        if tape is not None:
-            line = tape.line(line, "uart", baud)
-        node = NodeClient(line, found.interface)
-        target = Target(text, found.interface, node, line, device=found, on_close=[line.close])
+        if registers is None:
+            _check_type(text, found, lambda: node_type_on(line), line.close)
+        taped = line if tape is None else tape.line(line, "uart", baud)
+        node = NodeClient(taped, found.interface)
+        target = Target(text, found.interface, node, taped, device=found, on_close=[taped.close])
         if registers is not None:
-            target.registers = RegisterClient(RegisterLine(line), registers)
+            target.registers = RegisterClient(RegisterLine(taped), registers)
         bauds = {"uart": baud}
     if service_port is not None:
         bauds["bench_uart"] = _open_service_port(target, service_port, tape)
     if tape is not None:
         tape.begin(target.interface.name.lower(), bauds)
     return target
+
+
+def _check_type(
+    text: str, wanted: AnyDevice, node_type: Callable[[], int | None], close: Callable[[], None]
+) -> None:
+    """Raise TargetError, and close the port, if the node is another registered device."""
+    with ExitStack() as stack:
+        stack.callback(close)
+        found = node_type()
+        known = {node_type_of(one.interface): one for one in devices()}
+        if found is not None and found != node_type_of(wanted.interface) and found in known:
+            other = known[found]
+            raise TargetError(
+                f"{text}: node type {found} is {_a(other.title)}, not {_a(wanted.title)}; "
+                f"choose device {other.name}"
+            )
+        stack.pop_all()
+
+
+def _a(title: str) -> str:
+    return f"{'an' if title[0] in 'AEIOU' else 'a'} {title}"
+
+
+def _node_type_at(bus: I2cBus, interface: Interface, address: int | None) -> int | None:
+    try:
+        values = I2cClient(bus, interface, address, retries=0).telemetry(IDENTIFICATION.name)
+    except (NodeError, InterfaceError):  # nobody there, or a device without this frame
+        return None
+    return int(values[IDENTIFICATION.fields[0].name])
 
 
 def _open_service_port(target: Target, text: str, tape: HostRecorder | None) -> int:
@@ -257,6 +290,7 @@ def _open_i2c(text: str, name: str | None, tape: HostRecorder | None) -> Target:
     opened = _open_bus(number)
     bus: I2cBus = opened if tape is None else tape.bus(opened)
     own = None if address in _addresses(interface)[1:] else address
+    _check_type(text, owner, lambda: _node_type_at(opened, interface, own), opened.close)
     node, registers = I2cClient(bus, interface, own), _registers(interface, bus, time.sleep)
     on_close = [opened.close]
     return Target(text, interface, node, registers=registers, device=owner, on_close=on_close)

@@ -23,7 +23,7 @@ from cubestack.firmware_model.interface.codec.switch_messages import SHOWN, show
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.node.state import SERIAL_NUMBER, identification
 
-NODE_TYPE = 6
+NODE_TYPE = INTERFACE.node_type
 
 _U16, _U32 = 0xFFFF, 0xFFFF_FFFF
 

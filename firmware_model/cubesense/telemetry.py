@@ -18,7 +18,7 @@ from cubestack.firmware_model.interface.cubesense import INTERFACE, codes, pins,
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.node.state import identification
 
-NODE_TYPE = 4  #: assumed
+NODE_TYPE = INTERFACE.node_type
 
 SERIAL_BYTES = INTERFACE.telemetry("SerialNumber").length
 

@@ -16,7 +16,7 @@ from cubestack.firmware_model.interface.cubestar import INTERFACE, ImageBlockSiz
 from cubestack.firmware_model.interface.cubestar.flags import flag_fields
 from cubestack.firmware_model.node.state import SERIAL_NUMBER, identification
 
-NODE_TYPE = 5
+NODE_TYPE = INTERFACE.node_type
 
 PROCESSING_LIMIT_MS = 500  #: CubeStar thesis, section 5.3.6
 

@@ -18,8 +18,9 @@ from collections import Counter
 
 from cubestack.host.cli.arguments import add_flag
 from cubestack.host.cli.device_options import add_target_arguments, given_options, open_any_target
+from cubestack.host.conformance.comparison import Difference, compare, table
 from cubestack.host.conformance.contract import CheckResult, CheckRun, Verdict
-from cubestack.host.conformance.suite import compare, run_suite
+from cubestack.host.conformance.suite import run_suite
 from cubestack.host.terminal import busy, tell
 
 MARKS = {Verdict.PASSED: "ok", Verdict.FAILED: "FAILED"}
@@ -31,9 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_target_arguments(parser)
     add_flag(parser, "--allow-write", "also send telecommands and write registers")
     parser.add_argument(
-        "--compare",
-        metavar="TARGET",
-        help="compare with another target and show the first difference",
+        "--compare", metavar="TARGET", help="compare with another target and show all differences"
     )
     add_flag(parser, "--json", "print one JSON object per check")
 
@@ -55,9 +54,9 @@ def run(args: argparse.Namespace) -> int:
                 runs.append(run_suite(target, args.allow_write, on_check))
         finally:
             target.close()
-    difference = compare(*runs) if len(runs) == 2 else None
-    _summarise(runs, difference, as_json=args.json)
-    return int(any(one.failed for one in runs) or difference is not None)
+    differences = compare(*runs) if len(runs) == 2 else []
+    _summarise(runs, differences, as_json=args.json)
+    return int(any(one.failed for one in runs) or bool(differences))
 
 
 def _show_text(check: CheckResult) -> None:
@@ -75,7 +74,7 @@ def _show_json(check: CheckResult) -> None:
     print(json.dumps(content), flush=True)
 
 
-def _summarise(runs: list[CheckRun], difference: str | None, *, as_json: bool) -> None:
+def _summarise(runs: list[CheckRun], differences: list[Difference], *, as_json: bool) -> None:
     for one in runs:
         counts = Counter(check.verdict for check in one.checks)
         numbers = {verdict.value: counts[verdict] for verdict in Verdict}
@@ -87,8 +86,8 @@ def _summarise(runs: list[CheckRun], difference: str | None, *, as_json: bool) -
                 print(f"{number} left out: {reason}")
             text = ", ".join(f"{number} {name}" for name, number in numbers.items())
             print(f"{one.target.name}: {text}")
-    if len(runs) == 2:
-        if as_json:
-            print(json.dumps({"difference": difference}))
-        else:
-            print(f"first difference: {difference or 'none'}")
+    if len(runs) == 2 and as_json:
+        listed = [vars(one) | {"kind": one.kind.value} for one in differences]
+        print(json.dumps({"differences": listed}))
+    elif len(runs) == 2:
+        print("\n".join(table(differences, *(one.target.name for one in runs))))

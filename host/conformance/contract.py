@@ -21,6 +21,7 @@ from cubestack.host.targets import Target
 LATE_S = 0.04
 """Allowed time of an answer without its time on the wire: the poll period of real hosts."""
 
+TIMES_CHECK = "times of answers"
 ATTEMPTS = 3
 BITS_PER_BYTE = 10
 FRAMING_BYTES = 4

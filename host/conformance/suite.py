@@ -34,27 +34,6 @@ def run_suite(
     return run
 
 
-def compare(first: CheckRun, second: CheckRun) -> str | None:
-    """The first difference between two runs in words, or None."""
-    others = {check.name: check for check in second.checks}
-    one, other = first.target.name, second.target.name
-    for check in first.checks:
-        found = others.get(check.name)
-        if found is None:
-            return f"{check.name}: only on {one}"
-        if check.verdict is not found.verdict:
-            return (
-                f"{check.name}: {check.verdict.value} on {one}, {found.verdict.value} on {other} "
-                f"({found.detail or check.detail})"
-            )
-        for here, there in zip(check.observed, found.observed, strict=False):
-            if here != there:
-                return f"{check.name}: {here} on {one}, {there} on {other}"
-        if len(check.observed) != len(found.observed):
-            return f"{check.name}: {len(check.observed)} values on {one}, not on {other}"
-    return None
-
-
 UNKNOWN_SAMPLES = 3
 """Number of unknown telemetry IDs to try: each costs a time-out."""
 
@@ -159,7 +138,7 @@ def _check_registers(run: CheckRun, registers: PointerMap) -> None:
 
 
 def _check_times(run: CheckRun) -> None:
-    with run.check("times of answers"):
+    with run.check(contract.TIMES_CHECK):
         if not run.latencies_s:
             raise contract.SkippedError("no telemetry request was answered")
         slowest = max(run.latencies_s, key=lambda name: run.latencies_s[name])

@@ -143,6 +143,8 @@ class ConformanceNotes:
             all, each with its number behind the name.
         optional: telecommands and registers of which some values need an option of the hardware;
             without it they are refused.
+        results: frames, or fields as "Frame.Field", with results of measurements and states since
+            power-up, which two equal devices need not share.
     """
 
     effects: Mapping[str, Callable[..., None]] = field(default_factory=dict)
@@ -150,6 +152,7 @@ class ConformanceNotes:
     not_shown: frozenset[str] = frozenset()
     keys: frozenset[str] = frozenset()
     optional: frozenset[str] = frozenset()
+    results: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)

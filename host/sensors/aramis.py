@@ -96,5 +96,25 @@ DEVICE: "Device[AramisBoard, Aramis]" = Device(
                 "SetField",
             }
         ),
+        results=frozenset(
+            [
+                "ExtendedIdentification.ResetCause",
+                "TcmdProcessed",
+                "SensorStatus",
+                "SystemTime",
+                "Attitude",
+                "BodyAttitude",
+                "Boresight",
+                "UploadStatus",
+                "ImageBlock",
+                "CameraRegister",
+                "LoopStatus",
+                "DetectionSummary",
+                "IdentificationSummary",
+                "StarDetails",
+                "SupplyStatus",
+                "Quality",
+            ]
+        ),
     ),
 )

@@ -77,6 +77,28 @@ DEVICE: "Device[CubeSenseBoard, CubeSense]" = Device(
     proofs=get("cubestack.hdl.proofs.cubesense:PROOFS"),
     wirings=get("cubestack.emulator.boards.cubesense.wiring:WIRINGS"),
     conformance=ConformanceNotes(
-        keys=frozenset({"Area"}), optional=frozenset({"SetNadirSearch", "NADIR_SEARCH"})
+        keys=frozenset({"Area"}),
+        optional=frozenset({"SetNadirSearch", "NADIR_SEARCH"}),
+        results=frozenset(
+            [
+                "CommunicationStatus",
+                "TcmdProcessed",
+                "Result1",
+                "Result2",
+                "Result1ThenSram1",
+                "Result2ThenSram2",
+                "Result1ThenSram2",
+                "Result2ThenSram1",
+                "Power",
+                "ImageFrame",
+                "ImageFrameInfo",
+                "Details1",
+                "Details2",
+                "NadirEdges1",
+                "NadirEdges2",
+                "Quality1",
+                "Quality2",
+            ]
+        ),
     ),
 )

@@ -100,6 +100,7 @@ def test_rejects_a_service_port_for_a_device_without_one():
 @pytest.mark.parametrize("recorded", [False, True])
 def test_both_lines_are_recorded_until_closed(tmp_path, monkeypatch, recorded):
     ports = {"a": Mock(Transport), "b": Mock(Transport)}
+    ports["a"].read.return_value = b""
     monkeypatch.setattr(targets, "open_transport", lambda text, _baud: ports[text])
     path = tmp_path / "a.rec" if recorded else None
     target = open_target("a", "cubesense", service_port="b", record=path)

@@ -49,6 +49,7 @@ __all__ = [
 INTERFACE = Interface(
     name="AraMiS",
     version=1,
+    node_type=6,
     i2c_address=0x1D,
     baud=57_600,
     telecommands=TELECOMMANDS,

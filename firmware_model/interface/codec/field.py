@@ -73,6 +73,7 @@ class Field(Declaration):
         choices_by: (other field, {its value: the choices that go with it}), or None.
         range_flag: error flag that a value outside these limits raises, or empty.
         flag: for a bool1 that shows an error flag: that flag's name.
+        counter: whether it counts events, so that two equal devices may show other values.
         reset: value after power-up; None takes zero.
         gap: unused bits between the field before and this one.
         bit_offset: first bit in its message, which places it; 0 outside of one.
@@ -90,6 +91,7 @@ class Field(Declaration):
     choices_by: tuple[str, Mapping[int, Choices]] | None = None
     range_flag: str = ""
     flag: str = ""
+    counter: bool = False
     reset: Value | None = None
     gap: int = 0
     bit_offset: int = field(default=0, init=False)

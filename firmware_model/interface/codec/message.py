@@ -179,6 +179,7 @@ class Interface:
         registers: registers behind another I2C address, or None.
         service_port: one-letter protocol on another serial port, or None.
         switches: choices between published and better algorithms.
+        node_type: first byte of its identification; 0: that in the table of the telemetry.
     """
 
     name: str
@@ -191,6 +192,7 @@ class Interface:
     registers: PointerMap | None = None
     service_port: LetterProtocol | None = None
     switches: type[Switches] = Switches
+    node_type: int = 0
 
     def __post_init__(self) -> None:
         for messages, kind in (

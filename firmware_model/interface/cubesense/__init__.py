@@ -17,6 +17,7 @@ from cubestack.firmware_model.interface.cubesense.telemetry import TELEMETRIES
 INTERFACE = Interface(
     name="CubeSense",
     version=2,
+    node_type=4,  # assumed
     i2c_address=0x1B,
     baud=57_600,
     telecommands=TELECOMMANDS,

@@ -82,8 +82,8 @@ _NODE = (
         byte_array(6, "SerialNumber", "ASCII; padded with zeros")
     ),
     _low(130, "CommunicationStatus", "counters and error flags of the host's buses").of(
-        u16("TcmdCount", "telecommands received"),
-        u16("TlmCount", "telemetry requests received"),
+        u16("TcmdCount", "telecommands received", counter=True),
+        u16("TlmCount", "telemetry requests received", counter=True),
         u8("TcmdBufferOverrun", "1: telecommand while the buffer was full"),
         u8("I2cTlmReadError", "1: read with no telemetry ID written before"),
         u8("UartProtocolError", "1: byte outside of a frame, or unknown escape"),

@@ -50,6 +50,7 @@ __all__ = [
 INTERFACE = Interface(
     name="CubeStar",
     version=3,
+    node_type=5,
     i2c_address=0x1A,
     baud=57_600,
     telecommands=PUBLISHED_TELECOMMANDS + EXTENSION_TELECOMMANDS,

@@ -78,7 +78,7 @@ _TELEMETRY = (
         f32("Q1", "vector part, y"),
         f32("Q2", "vector part, z"),
         f32("Q3", "scalar part"),
-        u32("FrameCounter", "number of the image since power-up"),
+        u32("FrameCounter", "number of the image since power-up", counter=True),
         u32("ImageTime", "uptime at mid-exposure", "ms"),
         enum8("Mode", "mode that identified the image", choices=MatchMode),
         u8("Matched", "stars used for the attitude"),
@@ -102,7 +102,7 @@ _TELEMETRY = (
     ),
     Message(203, "UploadStatus", "progress of an upload").of(
         u16("NextBlock", "number after the latest block"),
-        u16("BlocksReceived", "blocks since UploadImage"),
+        u16("BlocksReceived", "blocks since UploadImage", counter=True),
     ),
     Message(204, "SupplyReport", "supply monitoring").of(
         u16("SramCurrent", "current of the processor's SRAM", "mA", 10),
@@ -116,7 +116,7 @@ _TELEMETRY = (
         u8("Valid", "1: the sensor acknowledged"),
     ),
     Message(206, "LoopStatus", "state of the main loop and of the settings that are extensions").of(
-        u32("Iterations", "iterations since power-up"),
+        u32("Iterations", "iterations since power-up", counter=True),
         u8("ModeFlag", "mode for the next image", choices=MatchMode),
         u16("FrameRate", "the sensor's frame-rate register"),
         u16("DiscardDelay", "wait after enabling the sensor", "ms"),
@@ -132,7 +132,7 @@ _TELEMETRY = (
     ),
     _SWITCHES_SHOWN,
     Message(209, "Quality", "quality of the latest image's attitude, or why there is none").of(
-        u32("FrameCounter", "number of the image since power-up"),
+        u32("FrameCounter", "number of the image since power-up", counter=True),
         enum8("Reason", "why there is no attitude, or SOLVED", choices=Reason),
         *ATTITUDE_QUALITY,
         f32("Background", "mean brightness of the sky", "DN"),

@@ -82,9 +82,9 @@ _NODE = (
         u16("SerialNumber", "serial number"),
         _temperature("Temperature"),
         enum8("ResetCause", "why the processor started", choices=codes.ResetCause),
-        u16("WDGResetCount", "resets by the watchdog"),
-        u16("TcmdCount", "telecommands accepted, modulo 65536"),
-        u16("TlmCount", "telemetry requests answered, modulo 65536"),
+        u16("WDGResetCount", "resets by the watchdog", counter=True),
+        u16("TcmdCount", "telecommands accepted, modulo 65536", counter=True),
+        u16("TlmCount", "telemetry requests answered, modulo 65536", counter=True),
     ),
     Message(130, "ErrorFlags", "errors since ClearErrorFlags").of(*flag_fields()),
     Message(131, "TcmdProcessed", "acknowledge of the last telecommand").of(
@@ -311,7 +311,7 @@ _LOG = (
     Message(174, "LogStatus", "state and errors in one frame").of(
         _temperature("Temp"),
         u32("Runtime", "uptime", "s"),
-        u16("WDGcounter", "resets by the watchdog"),
+        u16("WDGcounter", "resets by the watchdog", counter=True),
         _task("Status"),
         _switch("SW"),
         *_CURRENTS,

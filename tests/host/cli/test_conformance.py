@@ -38,7 +38,7 @@ def test_emulated_device_passes_all_checks(conformance, device):
 
 def test_compare_reports_a_changed_default(conformance, monkeypatch):
     code, lines = conformance("emulated:cubesense", "--compare", "emulated:cubesense")
-    assert (code, lines[-1]) == (0, {"difference": None})
+    assert (code, lines[-1]) == (0, {"differences": []})
     reset = CameraSettings.at_reset
     changed = []
 
@@ -51,9 +51,9 @@ def test_compare_reports_a_changed_default(conformance, monkeypatch):
     monkeypatch.setattr(CameraSettings, "at_reset", second_one_differs)
     code, lines = conformance("emulated:cubesense", "--compare", "emulated:cubesense")
     assert code == 1
-    assert lines[-1]["difference"] == (
-        "telemetry Configuration: Gain1=0 on emulated:cubesense, Gain1=1 on emulated:cubesense"
-    )
+    shown = {one["check"]: (one["here"], one["there"]) for one in lines[-1]["differences"]}
+    assert shown["telemetry Configuration"] == ("Gain1=0, Gain2=0", "Gain1=1, Gain2=1")
+    assert {one["kind"] for one in lines[-1]["differences"]} == {"another value"}
 
 
 def test_conformance_prints_a_text_report(run):

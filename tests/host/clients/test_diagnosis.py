@@ -13,9 +13,9 @@ from cubestack.emulator.native.compiler import find_compiler
 from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.host.clients import diagnosis
 from cubestack.host.clients.diagnosis import why_silent
-from cubestack.host.devices.registry import device
+from cubestack.host.devices.registry import device, devices
 from cubestack.host.emulation.process import emulating
-from cubestack.host.errors import NoAnswerError
+from cubestack.host.errors import NoAnswerError, TargetError
 from cubestack.host.shell.language import Shell
 from cubestack.host.targets import open_target
 from cubestack.host.transport.streams import SerialTransport, open_transport
@@ -110,3 +110,80 @@ def test_open_cable_restores_the_baud_rate(tmp_path: Path, monkeypatch: pytest.M
             line.close()
         finally:
             cable.terminate()
+
+
+@pytest.mark.skipif(not Path("/proc/self/fd").is_dir(), reason="no /proc here")
+def test_another_reader_of_the_port_is_named(tmp_path: Path) -> None:
+    port = tmp_path / "port"
+    port.write_text("")
+    assert list(diagnosis._other_users(str(port))) == []
+    with port.open() as opened, subprocess.Popen(["tail", "-f"], stdin=opened) as reader:
+        try:
+            assert list(diagnosis._other_users(str(port))) == [f"tail (process {reader.pid})"]
+        finally:
+            reader.terminate()
+
+
+class Fickle:
+    """A port of which ``answers`` says at which rate each request is answered."""
+
+    def __init__(self, answers: Callable[[int, int], bool]) -> None:
+        self.rate, self.asked, self._answers = 9600, 0, answers
+
+    def ask(self) -> bytes:
+        self.asked += 1
+        node = encode_frame(bytes(IDENTIFICATION.length))
+        return node if self._answers(self.asked, self.rate) else b""
+
+
+@pytest.mark.parametrize(
+    ("answers", "told"),
+    [
+        (lambda _n, rate: rate == 19200, "it answers at 19200 baud, and this is 9600"),
+        (lambda n, _rate: n in (2, 3, 6), "it answers now and then"),
+        (lambda n, _rate: n == 3, "it answers now and then"),
+    ],
+)
+def test_rate_is_blamed_only_if_it_explains_every_answer(
+    answers: Callable[[int, int], bool], told: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fickle = Fickle(answers)
+
+    class Port(SerialTransport):
+        def __init__(self) -> None:
+            self.name = "a port"
+
+        @property
+        def baud(self) -> int:
+            return fickle.rate
+
+        def set_baud(self, baud: int) -> bool:
+            fickle.rate = baud
+            return True
+
+    monkeypatch.setattr(diagnosis, "_ask", lambda _line, _interface: fickle.ask())
+    assert why_silent(Port(), INTERFACE) == told
+    assert fickle.rate == 9600
+
+
+@pytest.mark.parametrize("name", ["cubestar", "aramis"])
+def test_wrong_device_is_recognised_by_its_node_type(name: str) -> None:
+    wanted = device(name)
+    values = IDENTIFICATION.reset_values() | {"NodeType": INTERFACE.node_type}
+    with (
+        answering(lambda _data: encode_frame(IDENTIFICATION.pack(**values))) as port,
+        pytest.raises(TargetError, match=rf"node type 4 is a CubeSense, not an? {wanted.title};"),
+    ):
+        open_target(port, name)
+
+
+def test_device_with_an_unknown_node_type_is_accepted() -> None:
+    values = IDENTIFICATION.reset_values() | {"NodeType": 99}
+    with answering(lambda _data: encode_frame(IDENTIFICATION.pack(**values))) as port:
+        open_target(port, "cubestar").close()
+
+
+def test_each_device_has_a_node_type_of_its_own() -> None:
+    types = [diagnosis.node_type_of(one.interface) for one in devices()]
+    assert len({*types}) == len(types)
+    assert 0 not in types

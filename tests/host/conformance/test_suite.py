@@ -15,11 +15,12 @@ from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
 from cubestack.firmware_model.interface.cubestar import ResetCause
 from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitches
 from cubestack.host.clients.node import NodeClient
+from cubestack.host.conformance.comparison import Difference, Kind, compare, table
 from cubestack.host.conformance.contract import CheckResult, CheckRun, Verdict, values_to_try
 from cubestack.host.conformance.effects import check_stream
-from cubestack.host.conformance.suite import check_reads, compare
+from cubestack.host.conformance.suite import check_reads
 from cubestack.host.conformance.writes import check_writes
-from cubestack.host.devices.registry import device
+from cubestack.host.devices.registry import device, devices
 from cubestack.host.devices.shown_settings import read_back
 from cubestack.host.targets import Target
 
@@ -320,16 +321,66 @@ def runs(*checks: CheckResult) -> CheckRun:
     return CheckRun(Target("x", CUBESTAR, None), checks=list(checks))
 
 
-def test_comparison_shows_the_first_difference():
-    one, other = (CheckResult("a", Verdict.PASSED, "", (f"Gain={n}",)) for n in (1, 2))
-    assert compare(runs(one), runs(one)) is None
-    assert compare(runs(one), runs(other)) == "a: Gain=1 on x, Gain=2 on x"
-    failed = CheckResult("a", Verdict.FAILED, "why", ("Gain=1",))
-    assert compare(runs(one), runs(failed)) == "a: passed on x, failed on x (why)"
-    assert compare(runs(one), runs()) == "a: only on x"
-    two = CheckResult("a", Verdict.PASSED, "", ("Gain=1", "Gain=2"))
-    assert compare(runs(two), runs(one)) == "a: 2 values on x, not on x"
-    assert compare(runs(one), runs(two)) == "a: 1 values on x, not on x"
+def test_comparison_shows_all_differences_by_kind():
+    def checks(*results: tuple[str, Verdict, str]) -> CheckRun:
+        return runs(*(CheckResult(name, how, "why", (seen,)) for name, how, seen in results))
+
+    passed, failed, skipped = Verdict.PASSED, Verdict.FAILED, Verdict.SKIPPED
+    first = checks(
+        ("a", passed, "Gain=1"), ("b", passed, "x"), ("c", skipped, ""), ("d", passed, "")
+    )
+    other = checks(
+        ("a", passed, "Gain=2"), ("b", failed, "x"), ("c", passed, "y"), ("e", passed, "")
+    )
+    assert compare(first, first) == []
+    found = compare(first, other)
+    assert found == [
+        Difference(Kind.OUTCOME, "b", "passed", "failed: why"),
+        Difference(Kind.VALUE, "a", "Gain=1", "Gain=2"),
+        Difference(Kind.MISSING, "d", "passed", ""),
+        Difference(Kind.MISSING, "e", "", "passed"),
+    ]
+    assert table(found, "x", "y") == [
+        "4 differences between x (<) and y (>)",
+        "another outcome: 1",
+        "  b",
+        "    < passed",
+        "    > failed: why",
+        "another value: 1",
+        "  a",
+        "    < Gain=1",
+        "    > Gain=2",
+        "not checked on both: 2",
+        "  d",
+        "    < passed",
+        "  e",
+        "    > passed",
+    ]
+    assert table([], "x", "y") == ["x and y do not differ"]
+
+
+def test_comparison_leaves_out_counters_error_flags_and_results():
+    def seen(frame: str, *values: str) -> CheckRun:
+        run = runs(CheckResult(f"telemetry {frame}", Verdict.PASSED, "", values))
+        run.notes = NOTES["cubestar"]
+        return run
+
+    for frame, field in (
+        ("ExtendedIdentification", "TlmCount"),  # counts
+        ("ErrorFlags", "UART_ProtocolError"),  # a flag
+        ("ExtendedIdentification", "ResetCause"),  # declared as a state since power-up
+        ("DetectionSummary", "NumStarsDetected"),  # in a frame of results
+    ):
+        assert compare(seen(frame, f"{field}=1"), seen(frame, f"{field}=2")) == [], field
+    assert compare(seen("Exposure", "exposure=1"), seen("Exposure", "exposure=2")) != []
+
+
+def test_declared_results_exist():
+    for one in devices():
+        for name in one.conformance.results:
+            frame, _, field = name.partition(".")
+            message = one.interface.telemetry(frame)
+            assert not field or message.field(field)
 
 
 @pytest.mark.parametrize("name", ["Identification", "StarDetails"])
