@@ -1,7 +1,8 @@
 """Builds the bitstream of a bridged design for a development board, and reports whether it fits."""
 
 import json
-from collections.abc import Mapping
+import re
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Self
@@ -121,11 +122,12 @@ def build(
         "ecp5": ("--lpf", "pins", "--textcfg", text),
     }
     arguments = [*board.part, *files[board.family], "--json", "design.json", "--write", PLACED]
-    arguments += ["--report", REPORT, "--seed", "1", "-q", "--timing-allow-fail"]
+    arguments += ["--report", REPORT, "--seed", "1", "--timing-allow-fail"]
     try:
         run_placer(board.family, arguments, folder)
     except ToolError as error:
-        raise BoardError(f"{name} does not fit on {board.name}: {error}") from error
+        reason = ", ".join(too_many(error.output)) or str(error)
+        raise BoardError(f"{name} does not fit on {board.name}: {reason}") from error
     report = json.loads((folder / REPORT).read_text(encoding="utf-8"))
     fit = _fit(report, board, timing, name)
     built = Built(board.name, board.family, name, timing.divider)
@@ -133,6 +135,13 @@ def build(
     if not fit.problem:
         run_packer(board.family, text, BITSTREAM, folder)
     return fit
+
+
+def too_many(output: str) -> Iterator[str]:
+    """The cells that the part lacks, from the placer's list of what is used."""
+    for kind, used, available in re.findall(r"(\w+): +(\d+)/ *(\d+) +\d+%", output):
+        if int(used) > int(available):
+            yield f"{used} of {available} {kind}"
 
 
 def _fit(report: dict[str, Any], board: Board, timing: BridgeTiming, name: str) -> Fit:

