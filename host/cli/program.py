@@ -15,13 +15,20 @@ def read_console(count: int) -> bytes | None:
     try:
         stdin = sys.stdin.fileno()
         interactive = os.isatty(stdin)
-        if interactive and os.tcgetpgrp(stdin) != os.getpgrp():
-            return b""  # reading would stop a background process
+        if interactive and _in_background(stdin):
+            return b""  # reading would stop this process
         if select.select([stdin], [], [], 0)[0]:
             return os.read(stdin, count)
     except (AttributeError, OSError, ValueError):  # there is no standard input
         return b""
     return None if interactive else b""
+
+
+def _in_background(terminal: int) -> bool:
+    try:
+        return os.tcgetpgrp(terminal) != os.getpgrp()
+    except OSError:  # not the controlling terminal
+        return False
 
 
 def exit_status(status: int) -> int:

@@ -210,19 +210,42 @@ def test_custom_firmware_rejects_a_profile(elf: Path) -> None:
         cubestack.open_device("cubestar", firmware=str(elf), profile="extended")
 
 
-SYS_EXIT_EXTENDED = 0x20
+SYS_READC, SYS_EXIT_EXTENDED = 0x07, 0x20
+
+
+def exits_with(code: str) -> bytes:
+    """A program that exits with the status that ``code`` leaves in R0."""
+    return bytes(
+        Program(
+            f"{code}; ldr r1, =0x20000004; str r0, [r1]; ldr r1, =0x20000000; ldr r0, =0x20026; "
+            f"str r0, [r1]; ldr r0, ={SYS_EXIT_EXTENDED}; bkpt #0xAB; udf #0"
+        ).image
+    )
 
 
 @pytest.fixture
 def exiting(tmp_path: Path) -> list[str]:
     """Options for a program that exits with status 42."""
-    program = Program(
-        "ldr r0, =0x20000000; ldr r1, =0x20026; str r1, [r0]; ldr r0, =0x20000004; ldr r1, =42; "
-        f"str r1, [r0]; ldr r1, =0x20000000; ldr r0, ={SYS_EXIT_EXTENDED}; bkpt #0xAB; udf #0"
-    )
     path = tmp_path / "exits.bin"
-    path.write_bytes(program.image)
+    path.write_bytes(exits_with("movs r0, #42"))
     return ["--firmware", str(path), "--firmware-base", "0", "--semihosting"]
+
+
+def test_program_waits_for_console_input_while_time_passes(tmp_path: Path) -> None:
+    path = tmp_path / "reads.bin"
+    path.write_bytes(exits_with(f"movs r0, #{SYS_READC}; bkpt #0xAB"))
+    options = {"firmware": str(path), "firmware_base": "0", "semihosting": True}
+    typed: list[bytes | None] = [None]
+    statuses: list[int] = []
+    with open_device("cubestar", **options) as star:
+        star.board.connect_program(statuses.append, lambda _count: typed[0])
+        star.wait(0.5)
+        assert statuses == []
+        typed[0] = b"x"
+        star.wait(0.5)
+        assert statuses == [ord("x")]
+        star.wait(0.5)  # time passes, and the program has ended
+        assert statuses == [ord("x")]
 
 
 def test_exit_of_the_program_is_the_status_of_emulate(

@@ -159,6 +159,31 @@ def test_letimer_counts_down_from_its_top() -> None:
     assert bench["LETIMER0.IF"] & 4
 
 
+@settings(max_examples=40, deadline=None)
+@given(
+    st.integers(1, 40),
+    st.integers(0, 45),
+    st.booleans(),
+    st.lists(st.integers(0, 120), min_size=1, max_size=5),
+)
+def test_letimer_counts_like_a_stepped_counter(
+    compare0: int, compare1: int, watched: bool, waits: list[int]
+) -> None:
+    bench = letimer(TOP, COMP0=compare0, COMP1=compare1, IEN=7 if watched else 0, CMD=1)
+    while not bench["LETIMER0.CNT"]:  # until just after the first edge
+        bench.run_for(TICK // 16)
+    value = bench["LETIMER0.CNT"]
+    bench["LETIMER0.IFC"] = 0x1F
+    flags = 0
+    for wait in waits:
+        bench.run_for(wait * S // HZ)
+        for _ in range(wait):
+            flags |= (1 if value == compare0 else 0) | (2 if value == compare1 else 0)
+            flags |= 0 if value else 4
+            value = value - 1 if value else compare0
+        assert (bench["LETIMER0.CNT"], bench["LETIMER0.IF"]) == (value, flags)
+
+
 def test_letimer_wakes_from_em2_each_period() -> None:
     bench = letimer(TOP, interrupts=True, COMP0=327, IEN=4, CMD=1)
     times = []
