@@ -62,5 +62,7 @@ class Contract:
     properties: Mapping[str, Property] = field(default_factory=dict)  #: by name
     #: clocks that an input may be used with directly, and why; other inputs need a synchroniser
     inputs: Mapping[str, tuple[tuple[str, ...], str]] = field(default_factory=dict)
+    #: clocks whose registers any other clock may sample, and why
+    stable: Mapping[str, str] = field(default_factory=dict)
     #: crossings of the shipped design: names of a register's source and of the register, and why
     allowed: Mapping[tuple[str, str], str] = field(default_factory=dict)

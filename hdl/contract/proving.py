@@ -1,14 +1,16 @@
 """Tries to prove a contract's properties of a design, or refutes them."""
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from os import cpu_count
 from time import monotonic
 from types import SimpleNamespace
 from typing import NamedTuple
 
 from amaranth.hdl import Const, Module, Signal, Value
+from amaranth.lib.wiring import Component
 
 from cubestack.hdl.contract.contract import Property, Size
 from cubestack.hdl.contract.design import Design
@@ -17,7 +19,7 @@ from cubestack.hdl.proofs import counterexample, model
 from cubestack.hdl.proofs.counterexample import Counterexample
 
 #: Most steps of a proof; a clock takes two.
-STEPS = 44
+STEPS = 40
 
 #: Seconds that one step may take; then a property holds for the steps before.
 LIMIT_S = 5
@@ -45,28 +47,26 @@ class Verdict(NamedTuple):
         return f"holds for {clocks} clock{'s' * (clocks != 1)} from power-up (bounded proof)"
 
 
-def prove_contract(design: Design, text: str = "") -> Iterator[Verdict]:
-    """Verdicts of the properties whose name starts with ``text``, in their order.
-
-    Raises GatewareError, ToolMissingError, and ValueError if there is no such property.
-    """
+def properties_of(design: Design, text: str = "") -> dict[str, Property]:
+    """Those whose name starts with ``text``; ValueError if there is none."""
     properties = design.contract.properties
     chosen = {name: one for name, one in properties.items() if name.startswith(text)}
     if not chosen:
         raise ValueError(f"{text!r} is no property; there are {', '.join(properties)}")
+    return chosen
+
+
+def prove_contract(design: Design, properties: Mapping[str, Property]) -> Iterator[Verdict]:
+    """Verdicts in order; raises GatewareError and ToolMissingError."""
     size = design.contract.proof if design.sized else design.contract.full
     component = design.make(size)
     flat = model.flattened(rtlil_text(component, "design"))
-    pool = ThreadPoolExecutor(min(2, cpu_count() or 1))
-    try:
-        yield from pool.map(
-            lambda pair: _verdict(*pair, flat=flat, component=component, size=size), chosen.items()
-        )
-    finally:
-        pool.shutdown(cancel_futures=True)
+    prove = partial(_verdict, flat=flat, component=component, size=size)
+    with ThreadPoolExecutor(min(2, cpu_count() or 1)) as pool:
+        yield from pool.map(prove, properties, properties.values())
 
 
-def _verdict(name: str, one: Property, *, flat: str, component: object, size: Size) -> Verdict:
+def _verdict(name: str, one: Property, *, flat: str, component: Component, size: Size) -> Verdict:
     start = monotonic()
     harness = rtlil_text(model.Harness(component, {}, _assertions(one, size)), "harness")
     report = model.sat(flat, harness, (), STEPS, LIMIT_S)

@@ -32,6 +32,7 @@ read_rtlil harness.il
 hierarchy -top harness
 proc
 flatten
+memory_map
 chformal -lower
 clk2fflogic
 opt -full

@@ -142,13 +142,10 @@ def verdict_text(verdict: ProofVerdict) -> str:
     outcome = f"proved, induction over {result.steps}" if result.proved else "NOT PROVED"
     if result.counterexample:
         outcome = f"REFUTED after {result.steps} steps"
-    below = [] if result.shown is None else list(counterexample_text(result.shown))
     found = f"found after {planted.steps} steps" if planted.counterexample else "NOT FOUND"
     fault = proof.fault
     planted_bug = f"planted bug ({fault.wire} stuck at {fault.level}) {found}"
-    return "\n".join(
-        [f"{name}: {proof.property}", f"  {outcome}; {planted_bug}; {seconds}", *below]
-    )
+    return "\n".join([f"{name}: {proof.property}", f"  {outcome}; {planted_bug}; {seconds}"])
 
 
 def counterexample_text(shown: Counterexample) -> Iterator[str]:

@@ -153,7 +153,7 @@ class Netlist:
 
     def loop(self) -> list[str]:
         """Names of the nets on a loop of logic without a register; empty if there is none."""
-        depends = dict(self._dependencies())
+        depends = dict(self.dependencies())
         state: dict[Bit, int] = {}
         for root in depends:
             if root in state:
@@ -239,7 +239,7 @@ class Netlist:
                 "connections": {**pins, "Y": [bit]},
             }
 
-    def _dependencies(self) -> Iterator[tuple[Bit, list[Bit]]]:
+    def dependencies(self) -> Iterator[tuple[Bit, list[Bit]]]:
         """Bits that each output of a cell of logic depends on."""
         for cell in self.cells.values():
             kind, pins = cell["type"], cell["connections"]

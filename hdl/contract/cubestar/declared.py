@@ -7,6 +7,7 @@ from cubestack.firmware_model.interface.pins import Pin, resized
 from cubestack.hdl.blocks.counters import MatrixCounter
 from cubestack.hdl.contract.contract import FULL, QUICK, Check, Contract, Size
 from cubestack.hdl.contract.cubestar.points import POINTS
+from cubestack.hdl.contract.cubestar.properties import PROPERTIES
 from cubestack.hdl.cubestar.top import CubeStarTop
 
 #: A camera, an SRAM and a data clock in Verilog, for an image of full size.
@@ -53,6 +54,20 @@ CHECKS = {
 }
 
 
+_CAMERA = (("PIXCLK",), "the camera changes it with PIXCLK")
+_PROCESSOR = "the microcontroller changes one pin after the other"
+
+INPUTS = {
+    "PIXDATA": _CAMERA,
+    "HSYNC": _CAMERA,
+    "VSYNC": _CAMERA,
+    "ENABLE": (("DCLK",), _PROCESSOR),
+    "RNW": (("DCLK", "ENABLE"), _PROCESSOR),
+    "BANK": (("DCLK", "ENABLE"), "stable around the rising ENABLE"),
+    "SRAM_D_I": (("DCLK",), "the SRAM follows the address, which DCLK sets"),
+}
+
+
 def _pins(size: Size) -> tuple[Pin, ...]:
     return resized(PUBLISHED, SRAM_A=MatrixCounter.address_width(*size) + 1)
 
@@ -63,8 +78,11 @@ CONTRACT = Contract(
     shipped=lambda size: CubeStarTop(*size),
     full=Size(1024, 512),
     small={QUICK: (Size(8, 4),), FULL: (Size(8, 4), Size(4, 2), Size(16, 8))},
-    proof=Size(4, 2),
+    proof=Size(2, 2),
     parameters=lambda size: {"COLUMNS": size.columns, "ROWS": size.rows},
     checks=CHECKS,
     points=POINTS,
+    properties=PROPERTIES,
+    inputs=INPUTS,
+    stable={"ENABLE": "what the rising ENABLE latches does not change while it is high"},
 )

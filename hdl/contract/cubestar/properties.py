@@ -28,7 +28,7 @@ def _starts(m: Module, d: SimpleNamespace) -> None:
 
 def _camera_runs(m: Module, d: SimpleNamespace) -> None:
     """An edge of the pixel clock in each step; its data changes while it is low."""
-    m.d.comb += Assume(first_step() | (d.PIXCLK != past(m, d.PIXCLK)))
+    m.d.comb += Assume(first_step() | (past(m, d.PIXCLK) != d.PIXCLK))
     camera = Cat(d.PIXDATA, d.HSYNC, d.VSYNC)
     m.d.comb += Assume(first_step() | ~d.PIXCLK | (camera == past(m, camera)))
 
@@ -61,11 +61,14 @@ def _pulses(m: Module, d: SimpleNamespace) -> None:
     goes_on = low & past(m, low) & ~first_step()
     address, data = past(m, d.SRAM_A), past(m, d.SRAM_D_O)
     _starts(m, d)
+    camera = Cat(d.PIXDATA, d.HSYNC, d.VSYNC)
+    falls = ~d.PIXCLK & past(m, d.PIXCLK)
+    m.d.comb += Assume(first_step() | falls | (camera == past(m, camera)))
     m.d.comb += [
         Assert(~low | d.SRAM_D_OE, "SRAM_WE_N is low while the FPGA does not drive SRAM_D"),
         Assert(~low | ~d.SRAM_CE_N, "SRAM_WE_N is low while SRAM_CE_N is high"),
-        Assert(~goes_on | (d.SRAM_A == address), "SRAM_A changes while SRAM_WE_N is low"),
-        Assert(~goes_on | (d.SRAM_D_O == data), "SRAM_D changes while SRAM_WE_N is low"),
+        Assert(~goes_on | (address == d.SRAM_A), "SRAM_A changes while SRAM_WE_N is low"),
+        Assert(~goes_on | (data == d.SRAM_D_O), "SRAM_D changes while SRAM_WE_N is low"),
     ]
 
 
@@ -140,12 +143,12 @@ def _reads(m: Module, d: SimpleNamespace) -> None:
     """An SRAM whose bytes are their positions; no camera."""
     _starts(m, d)
     clocks = past(m, d.ENABLE)
-    m.d.comb += Assume(~d.ENABLE | ~clocks | first_step() | (d.PIXCLK == past(m, d.PIXCLK)))
+    m.d.comb += Assume(~d.ENABLE | ~clocks | first_step() | (past(m, d.PIXCLK) == d.PIXCLK))
     column, row = _position(d)
     bits = len(column)
-    m.d.comb += Assume(d.SRAM_D_I == _byte(column, row))
+    m.d.comb += Assume(_byte(column, row) == d.SRAM_D_I)
     reading = d.ENABLE & d.RNW
-    edges = Assume(~reading | ~past(m, reading) | first_step() | (d.DCLK != past(m, d.DCLK)))
+    edges = Assume(~reading | ~past(m, reading) | first_step() | (past(m, d.DCLK) != d.DCLK))
     m.d.comb += [edges, Assume(reading | ~d.DCLK), Assume(past(m, reading) | ~d.DCLK)]
     sync = domain(m, "count", d.DCLK, ~reading)
     x, y = Signal(bits), Signal(len(row))
@@ -156,7 +159,7 @@ def _reads(m: Module, d: SimpleNamespace) -> None:
     # In the step after the edge the SRAM presents the byte at a new address.
     steady = past(m, d.DCLK) == d.DCLK
     m.d.comb += Assert(
-        ~any_clock | ~d.DCLK | steady | (d.DATA == wanted), "a data clock presents a wrong byte"
+        ~any_clock | ~d.DCLK | steady | (wanted == d.DATA), "a data clock presents a wrong byte"
     )
 
 
