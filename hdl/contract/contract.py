@@ -44,6 +44,7 @@ class Property:
 
     requirement: str  #: one sentence
     harness: Callable[[Module, SimpleNamespace], None]
+    steps: int = 40  #: most steps of the proof; a clock takes two
 
 
 @dataclass(frozen=True)

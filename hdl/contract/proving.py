@@ -18,9 +18,6 @@ from cubestack.hdl.flow.generate import rtlil_text
 from cubestack.hdl.proofs import counterexample, model
 from cubestack.hdl.proofs.counterexample import Counterexample
 
-#: Most steps of a proof; a clock takes two.
-STEPS = 40
-
 #: Seconds that one step may take; then a property holds for the steps before.
 LIMIT_S = 5
 
@@ -69,7 +66,7 @@ def prove_contract(design: Design, properties: Mapping[str, Property]) -> Iterat
 def _verdict(name: str, one: Property, *, flat: str, component: Component, size: Size) -> Verdict:
     start = monotonic()
     harness = rtlil_text(model.Harness(component, {}, _assertions(one, size)), "harness")
-    report = model.sat(flat, harness, (), STEPS, LIMIT_S)
+    report = model.sat(flat, harness, (), one.steps, LIMIT_S)
     steps = len(re.findall(r"^Base case for induction length \d+ proven", report, re.MULTILINE))
     shown = None
     if "model found for base case: FAIL!" in report:

@@ -46,8 +46,8 @@ def rows_of(content: bytes) -> Rows:
 
 
 def pause() -> list[Tick]:
-    """Between two images."""
-    return list(vsync(random.randint(8, 20)))
+    """Between two images; VSYNC rises some clocks before the first row."""
+    return [*vsync(random.randint(8, 20)), *line([], random.randint(2, 6))]
 
 
 class ContractBench(CubeStarBench):

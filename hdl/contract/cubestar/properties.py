@@ -177,7 +177,7 @@ PROPERTIES = {
     "whole-pulses": Property("Address and data are stable in each write pulse", _pulses),
     "standby": Property("In standby no pin is active", _standby),
     "no-write-while-reading": Property("While an image is read nothing is written", _reading),
-    "inside": Property("Writes stay inside of the image, in the latched bank", _inside),
+    "inside": Property("Writes stay inside of the image, in the latched bank", _inside, steps=30),
     "ack": Property("ACK rises only after all rows of a frame are written in order", _acknowledges),
     "read": Property("The n-th data clock presents the n-th byte", _reads),
 }

@@ -17,13 +17,14 @@ NAME = "prove"
 
 HELP = "prove properties of the designs"
 
-DESCRIPTION = """Prove properties of the shipped designs by induction: for any run time, any image
-and any order of clock edges. Each proof then runs on a design with a planted
-bug, which it must find. Needs the extra hdl; all proofs take one to two minutes.
+DESCRIPTION = """Prove properties of the shipped designs by induction: for any run time, any
+image and any order of clock edges. Each proof then runs on a design with a
+planted bug, which it must find. Needs the extra hdl; all proofs take one to two
+minutes.
 
 With --device: prove the device's contract at the pins of a design of yours, or
 of the shipped one without FILE. Each property is proved for any run time, holds
-for a number of clocks from power-up, or is refuted. Then the design's netlist is
+holds for a number of clocks from power-up, or is refuted. Then the netlist is
 searched for registers that sample an asynchronous signal.
 
 A refuted property is shown with its counterexample: the pins step by step, and

@@ -21,8 +21,8 @@ HELP = "test a design of yours against a device's contract"
 
 DESCRIPTION = """Test a design for a device's FPGA at its pins, with cocotb on Icarus Verilog:
 a camera, an SRAM and a processor around the design. The contract allows a few
-clocks of latency. Without FILE the shipped design is tested. Needs the extra hdl
-and Icarus Verilog.
+clocks of latency. Without FILE the shipped design is tested. Needs the extra
+hdl and Icarus Verilog.
 
 A design with parameters for the size of the image is tested with small images,
 others at full size, which takes about a minute.

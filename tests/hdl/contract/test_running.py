@@ -114,3 +114,9 @@ def test_design_that_hangs_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr("cubestack.hdl.contract.running.LIMIT_S", 2)
     report = run_checks(SHIPPED, text="bank", waves=tmp_path)
     assert [bool(result.error) for result in report.results] == [True]
+
+
+def test_documentation_lists_every_check_and_property() -> None:
+    text = (Path(__file__).parents[3] / "docs" / "gateware-tests.md").read_text(encoding="utf-8")
+    for name, one in {**CONTRACT.checks, **CONTRACT.properties}.items():
+        assert f"| `{name}` | {one.requirement} |" in text

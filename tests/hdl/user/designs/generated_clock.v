@@ -60,10 +60,10 @@ module generated_clock #(parameter COLUMNS = 1024, parameter ROWS = 512) (
     after = at[CW-1:0] != COLUMNS - 1 ? at + 1'b1
           : at[CW+RW-1:CW] != ROWS - 1 ? {at[CW+RW-1:CW] + 1'b1, {CW{1'b0}}} : 0;
   endfunction
-  always @(posedge read_clock or posedge storing)
-    if (storing) next <= 0;
-    else next <= after(next);
   wire off = ~(ENABLE & RNW);
+  always @(posedge read_clock or posedge off)
+    if (off) next <= 0;
+    else next <= after(next);
   always @(posedge read_clock or posedge off)
     if (off) DATA <= 0;
     else DATA <= SRAM_D_I;

