@@ -12,6 +12,7 @@ from cubestack.firmware_model.values import whole
 from cubestack.hdl.devboard.boards import BOARDS
 from cubestack.hdl.devboard.netlist import MUTANTS
 from cubestack.host.cli.arguments import Parser, add_flag, add_value
+from cubestack.host.cli.hdl import board_check
 from cubestack.host.cli.hdl.choice import one
 from cubestack.host.devices.registry import device as registered
 from cubestack.host.devices.registry import devices, merged_tables
@@ -65,6 +66,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_value(simulate, "seed", whole(0, "chooses the fault's place", 0))
     simulate.set_defaults(board_action=_simulate)
+    check = actions.add_parser(
+        board_check.NAME, help=board_check.HELP, description=board_check.DESCRIPTION
+    )
+    board_check.add_arguments(check)
+    check.set_defaults(board_action=board_check.run)
 
 
 def _add_build_arguments(parser: argparse.ArgumentParser) -> None:

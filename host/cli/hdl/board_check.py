@@ -80,9 +80,7 @@ def run(args: argparse.Namespace) -> int:
             steps=args.steps,
             frames=args.frames,
         )
-    found = None
-    for found in progress(check.run(), len(check), "steps", quiet=args.json):
-        pass
+    *_, found = [None, *progress(check.run(), len(check), "steps", quiet=args.json)]
     counters = [engine.link.counters for engine in opened]
     if found is not None and args.out is not None:
         _write_vcd(found, args.out)

@@ -7,11 +7,15 @@ import threading
 import tty
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from amaranth.hdl import Module
 from amaranth.lib.wiring import In
 
+from cubestack.emulator.rtl import board_model
+from cubestack.emulator.rtl.board_model.board import SimulatedBoard
 from cubestack.emulator.rtl.contract import RtlEngine
 from cubestack.emulator.rtl.cxxrtl.engine import CompiledEngine
 from cubestack.emulator.rtl.devboard.channel import DevboardError
@@ -23,6 +27,8 @@ from cubestack.emulator.rtl.wiring import CameraPins, MemoryPins, Wiring
 from cubestack.firmware_model.interface.devboard.table import BAUD
 from cubestack.firmware_model.interface.pins import Pin, sram_pins
 from cubestack.hdl.blocks.pinned import PinnedComponent, connect_ports
+from cubestack.hdl.devboard.bridge import BridgeTiming
+from cubestack.hdl.devboard.bridged import Bridged, bridged_cxxrtl
 from cubestack.hdl.flow.generate import design_hash
 from tests.hdl.harness.devboard_model import DevboardModel
 
@@ -99,9 +105,7 @@ class DirectChannel:
 
     name = "direct"
 
-    def __init__(
-        self, board: DevboardModel, damage: Callable[[bytes], bytes] = lambda data: data
-    ) -> None:
+    def __init__(self, board: Any, damage: Callable[[bytes], bytes] = lambda data: data) -> None:
         self.board, self.damage = board, damage
         self._answers = bytearray()
         self.connected = True
@@ -173,3 +177,15 @@ def behind_pty(receive: Callable[[bytes], bytes]) -> Iterator[str]:
         os.close(slave)
         os.close(master)
         thread.join(5)
+
+
+#: A quick serial line, and a design that settles at once.
+QUICK = BridgeTiming(clock_hz=6_000_000, baud=3_000_000, settle=1)
+
+
+def bridge_board(wiring: Wiring, name: str = "top", timing: BridgeTiming = QUICK) -> SimulatedBoard:
+    """The gateware of a board, compiled: bridge and design before synthesis."""
+    bridged = Bridged(wiring.component, lines_of(wiring), timing, name)
+    header = Path(board_model.__file__).parent / "cxxrtl_board.h"
+    design = bridged_cxxrtl(bridged, wiring.component)
+    return SimulatedBoard(header.read_text(), timing.divider, design=design)

@@ -18,7 +18,7 @@ from ..cameras import Step, assert_same, assert_same_outputs, plain_camera, rand
 from ..pair_board import SIDES, SIZES, pair_camera
 from ..test_equivalence import random_step
 from ..test_equivalence_pair import random_steps
-from .boards import DirectChannel, direct, engine_on, model, noisy
+from .boards import DirectChannel, bridge_board, direct, engine_on, model, noisy
 
 SIZE = (16, 6)
 BOARD = cubestar_wiring(CubeStarTop(*SIZE))
@@ -41,6 +41,18 @@ def test_engines_agree_over_random_operation(seed: int) -> None:
     line_ps = int(camera.line_clocks * camera.period)
     skipping = bool(seed % 2)
     engines = [direct(BOARD, skipping=skipping), make_engine(BOARD, skipping=skipping)]
+    assert_same(engines, lambda engine: engine.attach(camera), "attach")
+    for _ in range(60):
+        step = random_step(rng, camera, 2 * line_ps)
+        assert_same(engines, step, step.__qualname__)
+
+
+@pytest.mark.parametrize("seed", quick(range(12), 2))
+def test_engine_on_the_gateware_of_a_board_agrees(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    camera = random_camera(rng, *SIZE)
+    line_ps = int(camera.line_clocks * camera.period)
+    engines = [engine_on(DirectChannel(bridge_board(BOARD)), BOARD), make_engine(BOARD)]
     assert_same(engines, lambda engine: engine.attach(camera), "attach")
     for _ in range(60):
         step = random_step(rng, camera, 2 * line_ps)
