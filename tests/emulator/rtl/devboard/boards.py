@@ -158,7 +158,10 @@ def direct(wiring: Wiring, timing: SramTiming | None = None, *, skipping: bool =
 
 @contextmanager
 def behind_pty(receive: Callable[[bytes], bytes]) -> Iterator[str]:
-    """A pseudo-terminal whose other end answers with what ``receive`` returns; its path."""
+    """A pseudo-terminal whose other end answers with what ``receive`` returns; its path.
+
+    OSError from ``receive`` pulls the cable.
+    """
     master, slave = pty.openpty()
     tty.setraw(slave, termios.TCSANOW)
 
@@ -168,6 +171,7 @@ def behind_pty(receive: Callable[[bytes], bytes]) -> Iterator[str]:
                 answer = receive(data)
                 while answer:
                     answer = answer[os.write(master, answer) :]
+        os.close(master)
 
     thread = threading.Thread(target=serve, daemon=True)
     thread.start()
@@ -175,7 +179,6 @@ def behind_pty(receive: Callable[[bytes], bytes]) -> Iterator[str]:
         yield os.ttyname(slave)
     finally:
         os.close(slave)
-        os.close(master)
         thread.join(5)
 
 

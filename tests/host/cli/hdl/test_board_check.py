@@ -63,3 +63,20 @@ def test_board_with_another_design_names_both(port: str, run: Run) -> None:
     assert (outcome.code, outcome.err.count("\n")) == (1, 1)
     assert "has the top top (design" in outcome.err
     assert "needs CubeSensePair (design" in outcome.err
+
+
+def test_cable_that_is_pulled_ends_the_run_in_order(run: Run, tmp_path: Path) -> None:
+    board, requests = model(cubestar_wiring()), iter(range(60))
+
+    def receive(data: bytes) -> bytes:
+        if next(requests, None) is None:
+            raise OSError
+        return board.receive(data)
+
+    with behind_pty(receive) as port:
+        outcome = run("measure", "cubestar", "--frames", 1, "--engine", f"board:{port}", "--json")
+    assert (outcome.code, outcome.out) == (1, "")
+    assert outcome.err == (
+        f"cubestack measure: the connection to the board on {port} was lost; check cable and"
+        " power\n"
+    )
