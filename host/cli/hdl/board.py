@@ -37,8 +37,8 @@ examples:
   cubestack hdl board icebreaker --top TOP --baud 1000000 --out out/board --json"""
 
 SIMULATE = """Run the placed netlist of a build behind a pseudo-terminal, in place of a board
-with its bitstream. Prints the port, and runs until it is interrupted. Build with
-a high --baud, half of the bridge's clock at most, for a quick simulation.
+with its bitstream. Prints the port, and runs until it is interrupted. For a
+quick simulation build with a high --baud, at most half of the bridge's clock.
 
 examples:
   cubestack hdl board icebreaker --top TOP --baud 12000000 --out out/board
