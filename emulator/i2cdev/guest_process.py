@@ -94,6 +94,11 @@ class GuestProcess(Endpoint):
         os.close(self._pidfd)
 
 
+def start_plain(command: Sequence[str]) -> GuestProcess:
+    """Start ``command``, which needs no route; raises OSError."""
+    return GuestProcess(subprocess.Popen(command, close_fds=False), command[0])
+
+
 def start_filtered(
     command: Sequence[str],
     environment: dict[str, str],

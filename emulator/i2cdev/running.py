@@ -5,7 +5,7 @@ import gc
 import signal
 import subprocess
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -76,6 +76,40 @@ def run_program(
         RouteError: the route is not available.
         CompilerError: the library of the preload route can not be built.
     """
+    with _forwarding() as begin:
+        program, supervisor, reason = _start(command, number, bus, route, streams)
+        run = begin(_Run(program, supervisor))
+        report(f"/dev/i2c-{number} is served by {reason}")
+        with _Limit(timeout_s, run) as limit:
+            _serve(bus, run, pace=pace, report=report)
+        if limit.reached:
+            raise subprocess.TimeoutExpired(list(command), timeout_s or 0.0)
+    return program.exit_code
+
+
+def run_beside(
+    command: Sequence[str],
+    kernel: Kernel,
+    busy: Callable[[], bool],
+    ports: Sequence[Endpoint],
+    *,
+    pace: Literal["real", "fast"],
+    report: Callable[[str], None] = lambda _text: None,
+) -> int:
+    """Run ``command`` while ``ports`` are served; returns its exit status. Raises OSError."""
+    with _forwarding() as begin:
+        run = begin(_Run(guest_process.start_plain(command), None))
+        with open_scheduler(
+            kernel, [*ports, run, *run.ports], busy, pace=pace, report=report
+        ) as scheduler:
+            run.on_end = scheduler.stop
+            scheduler.run()
+        return run.exit_code
+
+
+@contextlib.contextmanager
+def _forwarding() -> Iterator[Callable[["_Run"], "_Run"]]:
+    """Forward signals to the program that begins inside; closes its ports at the end."""
     running: list[_Run] = []
     early: list[int] = []
 
@@ -83,25 +117,22 @@ def run_program(
         if running:
             running[0].signalled(number)
         else:
-            early.append(number)  # the program may have started, but _start has not returned
+            early.append(number)  # the program may have started, but is not known yet
+
+    def begin(run: _Run) -> _Run:
+        running.append(run)
+        for each in early:
+            run.signalled(each)
+        return run
 
     handlers = {number: signal.signal(number, end) for number in (*FORWARDED, signal.SIGINT)}
     try:
-        program, supervisor, reason = _start(command, number, bus, route, streams)
-        running.append(run := _Run(program, supervisor))
-        for each in early:
-            run.signalled(each)
-        report(f"/dev/i2c-{number} is served by {reason}")
-        with _Limit(timeout_s, run) as limit:
-            _serve(bus, run, pace=pace, report=report)
-        if limit.reached:
-            raise subprocess.TimeoutExpired(list(command), timeout_s or 0.0)
+        yield begin
     finally:
         for signal_number, handler in handlers.items():
             signal.signal(signal_number, handler)
         for run in running:
             run.close()
-    return program.exit_code
 
 
 def _serve(
@@ -157,6 +188,11 @@ class _Run(Endpoint):
         """Whether no process is left that could call."""
         served = self._supervisor is not None and not self._supervisor.ended
         return self._dropped or (self._program.ended and not served)
+
+    @property
+    def exit_code(self) -> int:
+        """Of the program, as in a shell."""
+        return self._program.exit_code
 
     @property
     def shares_processor(self) -> bool:

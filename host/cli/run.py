@@ -1,8 +1,9 @@
-"""Run an unmodified program that sees an emulated I2C bus as /dev/i2c-N.
+"""Run an unmodified program against emulated devices, on I2C or serial lines.
 
-It needs no privileges and no kernel module: seccomp user notification, or a
-preloaded library, intercepts the program's calls on that file. The exit status is
-the program's.
+On I2C it sees their bus as /dev/i2c-N. That needs no privileges and no kernel
+module: seccomp user notification, or a preloaded library, intercepts the program's
+calls on that file. With --serial, {port} becomes the path of a pseudo-terminal. The
+exit status is the program's.
 
 examples:
   cubestack run -- i2cdetect -y 7
@@ -10,26 +11,37 @@ examples:
   cubestack run --bus 1 --pace fast -- python3 flight_software.py
   cubestack run --device {first} --device {second} --hz 400000 -- ./program
   cubestack run --attach -- i2cget -y 7 0x1a 0x83  on the bus of `emulate --i2c 7`
+  cubestack run --serial {first} -- python3 flight_software.py {port}
 """
 
 import argparse
 import errno
 import shutil
 import tempfile
+from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
 from cubestack.emulator.i2cdev.adapter import I2cAdapter
 from cubestack.emulator.i2cdev.guest_process import RouteError
-from cubestack.emulator.i2cdev.running import HostBus, attached_bus, emulated_bus, run_program
+from cubestack.emulator.i2cdev.running import (
+    HostBus,
+    attached_bus,
+    emulated_bus,
+    run_beside,
+    run_program,
+)
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.formats.linux_i2c import socket_path
 from cubestack.firmware_model.values import whole
 from cubestack.host.cli import device_options
 from cubestack.host.cli.arguments import add_flag, add_path, add_value
 from cubestack.host.cli.ports import check_linux
+from cubestack.host.devices.device import AnyDevice
 from cubestack.host.devices.registry import device, device_names, devices
 from cubestack.host.emulation.emulated import AnyEmulated, open_device
+from cubestack.host.emulation.terminals import PORT, Terminals
+from cubestack.host.options import option_string
 from cubestack.host.terminal import busy, say
 
 DEFAULT_BUS = 7
@@ -56,6 +68,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         choices=device_names(),
         help=f"device on the bus; repeatable (default {device_names()[0]})",
     )
+    parser.add_argument(
+        "--serial",
+        action="append",
+        choices=device_names(),
+        help="device on serial lines instead of I2C; repeatable. {port} is the first one's "
+        "pseudo-terminal, {NAME} that of device NAME; its bench line has the suffix .bench",
+    )
+    add_flag(parser, "--strict-line", "with --serial: as for emulate")
     parser.add_argument(
         "--i2c-addr",
         action="append",
@@ -94,6 +114,10 @@ def run(args: argparse.Namespace) -> int:
     if shutil.which(args.program[0]) is None:
         raise ValueError(f"{args.program[0]}: no such program; give a path, or a name on the PATH")
     with ExitStack() as stack:
+        if args.serial:
+            return _run_on_serial_lines(args, stack)
+        if args.strict_line:
+            raise ValueError("--strict-line goes with --serial")
         if args.attach is None:
             bus = _emulated(args, stack)
         else:
@@ -112,10 +136,40 @@ def run(args: argparse.Namespace) -> int:
             raise OSError(str(error)) from None
 
 
-def _emulated(args: argparse.Namespace, stack: ExitStack) -> HostBus:
-    names = args.device or device_names()[:1]
+def _run_on_serial_lines(args: argparse.Namespace, stack: ExitStack) -> int:
+    for name in ("attach", "device", "i2c_addr", "route"):
+        if getattr(args, name) not in (None, []):
+            raise ValueError(f"{option_string(name)} is for I2C: leave it out with --serial")
+    report = (lambda _text: None) if args.quiet else say
+    opened = _power_up(args.serial, args, stack)
+    kernel = opened[0].board.kernel
+    folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="cubestack-"))
+    terminals = Terminals(opened, Path(folder), stack, strict=args.strict_line, report=say)
+    words = terminals.fill_in(args.program)
+    if words == args.program:
+        places = ", ".join([PORT, *(f"{{{name}}}" for name in terminals.paths)])
+        raise ValueError(f"no word of the program is a port; write {places} where its path goes")
+    for one in opened:
+        report(f"{one.device.title} serves on {terminals.paths[one.device.name]}")
+    ends = [end for ends in terminals.endpoints for end in ends]
+    return run_beside(
+        words,
+        kernel,
+        lambda: any(one.board.busy() for one in opened),
+        ends,
+        pace=args.pace,
+        report=report,
+    )
+
+
+def _power_up(
+    names: Sequence[str], args: argparse.Namespace, stack: ExitStack
+) -> list[AnyEmulated]:
+    """The devices, booted; they share kernel and I2C bus."""
+    if len(set(names)) < len(names):
+        raise ValueError(f"name each device once: {' '.join(names)}")
     if len(names) > 1 and (args.scene or args.faults):
-        raise ValueError("--scene and --faults are of one device, and several are on the bus")
+        raise ValueError("--scene and --faults are of one device, and several are emulated")
     opened: list[AnyEmulated] = []
     for name in names:
         beside = opened[0] if opened else None
@@ -127,8 +181,16 @@ def _emulated(args: argparse.Namespace, stack: ExitStack) -> HostBus:
                 )
             )
         stack.callback(opened[-1].close)
-    board = opened[0].board
     device_options.inject_plan(opened[0].faults, args.faults, None if args.quiet else say)
+    kernel = opened[0].board.kernel
+    while any(one.board.busy() for one in opened) and kernel.now < BOOT_LIMIT_PS:
+        kernel.step()
+    return opened
+
+
+def _emulated(args: argparse.Namespace, stack: ExitStack) -> HostBus:
+    opened = _power_up(args.device or device_names()[:1], args, stack)
+    board = opened[0].board
     kernel, bus = board.kernel, board.i2c_bus
     bus.bit_ps = PS_PER_S // args.hz
     for old, new in args.i2c_addr:
@@ -137,8 +199,8 @@ def _emulated(args: argparse.Namespace, stack: ExitStack) -> HostBus:
     def at_work() -> bool:
         return any(one.board.busy() for one in opened)
 
-    while at_work() and kernel.now < BOOT_LIMIT_PS:
-        kernel.step()
+    if not args.quiet:
+        say(f"I2C bus {args.bus}: {', '.join(_on_bus(opened, args.i2c_addr))}")
     adapter = I2cAdapter(kernel, bus, address_errno=int(getattr(errno, args.nack_errno)))
     folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="cubestack-"))
     host_bus = emulated_bus(kernel, at_work, adapter, Path(folder) / f"i2c-{args.bus}")
@@ -146,10 +208,17 @@ def _emulated(args: argparse.Namespace, stack: ExitStack) -> HostBus:
     return host_bus
 
 
-def _addresses() -> dict[str, int]:
+def _on_bus(opened: Sequence[AnyEmulated], moves: Sequence[tuple[int, int]]) -> list[str]:
+    """What answers at which address."""
+    now = dict(moves)
+    found = _addresses(one.device for one in opened)
+    return [f"{name} at {now.get(address, address):#04x}" for name, address in found.items()]
+
+
+def _addresses(of: Iterable[AnyDevice] | None = None) -> dict[str, int]:
     """What is where at first: each device's node, and its registers behind another address."""
     found = {}
-    for one in devices():
+    for one in devices() if of is None else of:
         found[one.name] = one.interface.i2c_address
         if one.interface.registers is not None:
             found[f"{one.name}-registers"] = one.interface.registers.i2c_address

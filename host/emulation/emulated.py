@@ -14,8 +14,9 @@ from __future__ import annotations
 import subprocess
 import tempfile
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Literal, TypeAlias
@@ -36,9 +37,6 @@ if TYPE_CHECKING:
     from cubestack.emulator.boards.contract import Board
     from cubestack.emulator.faults.injector import Faults
     from cubestack.emulator.ports.realtime import RealtimeScheduler
-
-PORT = "{port}"
-"""Placeholder for the port's path in a command of ``run``."""
 
 
 @dataclass(eq=False)
@@ -109,35 +107,42 @@ class EmulatedDevice(Closable, Generic[BoardT_co, ClientT_co]):
         return CubeSMBus(link=self.board.i2c())
 
     def run(
-        self, *command: str | Path, timeout_s: float = 60.0, pace: Literal["real", "fast"] = "fast"
+        self,
+        *command: str | Path,
+        timeout_s: float = 60.0,
+        pace: Literal["real", "fast"] = "fast",
+        beside: Sequence[AnyEmulated] = (),
     ) -> subprocess.CompletedProcess[str]:
-        """Run a program against the serial line; returns exit status and output.
+        """Run a program against the serial lines; returns exit status and output.
 
-        Every "{port}" in ``command`` becomes the path of a pseudo-terminal. Warns if the program
-        sets another baud rate, parity or stop bits than the device has. Raises
+        Every "{port}" in ``command`` becomes the path of a pseudo-terminal; a further line has a
+        suffix, as in "{port}.bench". Devices ``beside`` this one have theirs, as in "{cubesense}".
+        Warns if the program sets another baud rate, parity or stop bits than the device has. Raises
         subprocess.TimeoutExpired after ``timeout_s`` of wall time.
         """
         from cubestack.emulator.i2cdev.scheduler import open_scheduler
-        from cubestack.emulator.ports.pseudo_terminal import PtyEndpoint
+        from cubestack.host.emulation.terminals import Terminals
 
-        self._client = None
-        with tempfile.TemporaryDirectory(prefix="cubestack-") as folder:
-            port = Path(folder) / "tty"
-            endpoint = PtyEndpoint(port, self.board.uart, report=warnings.warn)
-            try:
-                words = [str(word).replace(PORT, str(port)) for word in command]
-                with open_scheduler(
-                    self.board.kernel, [endpoint], self.board.busy, pace=pace
-                ) as scheduler:
-                    program = subprocess.Popen(
-                        words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-                    )
-                    with ThreadPoolExecutor(1) as threads:
-                        done = threads.submit(_watch, program, timeout_s, scheduler)
-                        scheduler.run()
-                        return done.result()
-            finally:
-                endpoint.close()
+        devices: list[AnyEmulated] = [self, *beside]
+        with ExitStack() as stack:
+            folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="cubestack-"))
+            for one in devices:
+                one._client = None
+            terminals = Terminals(devices, Path(folder), stack, report=warnings.warn)
+            words = terminals.fill_in([str(word) for word in command])
+            schedulers = [
+                stack.enter_context(open_scheduler(kernel, endpoints, busy, pace=pace))
+                for kernel, endpoints, busy in terminals.by_kernel()
+            ]
+            program = subprocess.Popen(
+                words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+            )
+            with ThreadPoolExecutor(len(schedulers)) as threads:
+                done = threads.submit(_watch, program, timeout_s, schedulers)
+                for scheduler in schedulers[1:]:
+                    threads.submit(scheduler.run)
+                schedulers[0].run()
+                return done.result()
 
     def run_on_i2c(
         self, *command: str | Path, bus: int = 7, timeout_s: float = 60.0
@@ -190,9 +195,9 @@ AnyEmulated: TypeAlias = "EmulatedDevice[Board, DeviceClient]"
 
 
 def _watch(
-    program: subprocess.Popen[str], timeout_s: float, scheduler: RealtimeScheduler
+    program: subprocess.Popen[str], timeout_s: float, schedulers: Sequence[RealtimeScheduler]
 ) -> subprocess.CompletedProcess[str]:
-    """Wait for a program, then stop the scheduler."""
+    """Wait for a program, then stop the schedulers."""
     try:
         output, errors = program.communicate(timeout=timeout_s)
         return subprocess.CompletedProcess(program.args, program.returncode, output, errors)
@@ -201,7 +206,8 @@ def _watch(
             program.kill()
         raise
     finally:
-        scheduler.stop()
+        for scheduler in schedulers:
+            scheduler.stop()
 
 
 def check_options(

@@ -74,7 +74,7 @@ def test_hanging_program_is_killed(device: Any) -> None:
     with pytest.raises(subprocess.TimeoutExpired):
         device.run(sys.executable, "-c", "import time; time.sleep(60)", timeout_s=0.3)
     done = device.run(sys.executable, "-c", "print('{port}')")
-    assert done.stdout.endswith("/tty\n")
+    assert done.stdout.endswith("/ttyCUBESTAR\n")
 
 
 def test_missing_program_raises(device: Any) -> None:
