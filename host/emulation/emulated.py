@@ -116,7 +116,7 @@ class EmulatedDevice(Closable, Generic[BoardT_co, ClientT_co]):
         """Run a program against the serial lines; returns exit status and output.
 
         Every "{port}" in ``command`` becomes the path of a pseudo-terminal; a further line has a
-        suffix, as in "{port}.bench". Devices ``beside`` this one have theirs, as in "{cubesense}".
+        suffix, as in "{port}.bench". Of devices ``beside`` this one it is their name in braces.
         Warns if the program sets another baud rate, parity or stop bits than the device has. Raises
         subprocess.TimeoutExpired after ``timeout_s`` of wall time.
         """

@@ -4,17 +4,25 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from cubestack.emulator.boards.contract import Board
 from cubestack.emulator.ports.pseudo_terminal import PtyEndpoint
 from cubestack.emulator.sim.virtual_time import Kernel
-
-if TYPE_CHECKING:
-    from cubestack.host.emulation.emulated import AnyEmulated
+from cubestack.host.devices.device import AnyDevice
 
 PORT = "{port}"
 """In a program's words: the path of the first device's terminal."""
+
+
+class Powered(Protocol):
+    """A powered-up device."""
+
+    @property
+    def device(self) -> AnyDevice: ...
+
+    @property
+    def board(self) -> Board: ...
 
 
 class Terminals:
@@ -27,7 +35,7 @@ class Terminals:
 
     def __init__(
         self,
-        devices: Sequence["AnyEmulated"],
+        devices: Sequence[Powered],
         folder: Path,
         stack: ExitStack,
         *,

@@ -45,7 +45,7 @@ def choice_rows(choices: Choices) -> list[str]:
 def field_json(field: Field) -> dict[str, object]:
     by = field.choices_by
     return {
-        **picked(field, "name", "type", "bit_offset", "meaning", "unit", "scale"),
+        **picked(field, "name", "type", "bit_offset", "byte_offset", "meaning", "unit", "scale"),
         "choices": _numbers(field.choices),
         "choices_by": by and (by[0], {at: _numbers(choices) for at, choices in by[1].items()}),
         **dict(zip(("minimum", "maximum"), field.ends, strict=True)),

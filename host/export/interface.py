@@ -15,11 +15,11 @@ from cubestack.host.export.side_protocols import side_json, side_markdown, side_
 def _table(interface: Interface) -> str:
     lines = [_summary(interface)]
     for kind in MessageKind:
-        lines += ["", f"{kind.value.upper()}  (bit offset, type, name, meaning)"]
+        lines += ["", f"{kind.value.upper()}  (byte, bit offset, type, name, meaning)"]
         for message in (m for m in interface.messages if m.kind is kind):
             lines.append(f"{message.id:4d} {message.name}, {message.length} B: {_meaning(message)}")
             lines += [
-                f"     {field.bit_offset:5d} {field_text.field_type(field):<13} {field.name:<31} "
+                f"     {field.place:>5} {field.bit_offset:5d} {field_text.field_type(field):<13} {field.name:<31} "
                 f"{field_text.field_details(field)}"
                 for field in message.fields
             ]
@@ -34,7 +34,8 @@ def _markdown(interface: Interface) -> str:
         "",
         _summary(interface),
         "",
-        "Fields are little-endian; an offset counts bits from the lowest bit of the first byte. "
+        "Fields are little-endian. A byte counts from 0, without frame and ID, and 2.3 is bit 3 of "
+        "byte 2, from the lowest; an offset counts the bits before the field. "
         "A value is the raw count divided by the number behind the type. Counts are rounded to the "
         "nearest, halves away from zero; telemetry saturates at the ends of its type. A "
         "telecommand with a parameter outside of its range is refused with error 3 and raises the "
@@ -53,9 +54,9 @@ def _markdown(interface: Interface) -> str:
         parts += ["", f"## {title}", ""]
         parts += [f"{meaning[0].upper()}{meaning[1:]}. Length {message.length}."]
         if message.fields:
-            parts += ["", "| offset | type | field | meaning |", "|-|-|-|-|"]
+            parts += ["", "| byte | offset | type | field | meaning |", "|-|-|-|-|-|"]
             parts += [
-                f"| {field.bit_offset} | {field_text.field_type(field)} | {field.name} "
+                f"| {field.place} | {field.bit_offset} | {field_text.field_type(field)} | {field.name} "
                 f"| {field_text.field_details(field)} |"
                 for field in message.fields
             ]

@@ -112,6 +112,17 @@ class Field(Declaration):
         object.__setattr__(self, "default", self.reset)
 
     @property
+    def byte_offset(self) -> int:
+        """The byte of its message in which it begins."""
+        return self.bit_offset // 8
+
+    @property
+    def place(self) -> str:
+        """Its byte, with the bit within if it is a part of one: "4", "2.3"."""
+        bit = self.bit_offset % 8
+        return f"{self.byte_offset}.{bit}" if bit or self.bits % 8 else f"{self.byte_offset}"
+
+    @property
     def bits(self) -> int:
         """Width in bits."""
         match = _BYTES.fullmatch(self.type)
