@@ -83,7 +83,7 @@ FAILED, WRONG_CALL = 1, 2
         ("memory cubesense --seconds 3", "--seconds has no effect for cubesense"),
         (
             "run --device cubestar --device aramis --faults x -- true",
-            "--scene and --faults are of one device, and several are on the bus",
+            "--scene and --faults are of one device, and several are emulated",
         ),
         (
             "run --device cubestar --device aramis --scene x -- true",
