@@ -56,7 +56,8 @@ def _markdown(interface: Interface) -> str:
         if message.fields:
             parts += ["", "| byte | offset | type | field | meaning |", "|-|-|-|-|-|"]
             parts += [
-                f"| {field.place} | {field.bit_offset} | {field_text.field_type(field)} | {field.name} "
+                f"| {field.place} | {field.bit_offset} "
+                f"| {field_text.field_type(field)} | {field.name} "
                 f"| {field_text.field_details(field)} |"
                 for field in message.fields
             ]
