@@ -19,7 +19,8 @@ def _table(interface: Interface) -> str:
         for message in (m for m in interface.messages if m.kind is kind):
             lines.append(f"{message.id:4d} {message.name}, {message.length} B: {_meaning(message)}")
             lines += [
-                f"     {field.place:>5} {field.bit_offset:5d} {field_text.field_type(field):<13} {field.name:<31} "
+                f"     {field.place:>5} {field.bit_offset:5d} "
+                f"{field_text.field_type(field):<13} {field.name:<31} "
                 f"{field_text.field_details(field)}"
                 for field in message.fields
             ]
