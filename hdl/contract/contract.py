@@ -61,7 +61,8 @@ class Contract:
     checks: Mapping[str, Check] = field(default_factory=dict)  #: by name
     points: Mapping[str, Group] = field(default_factory=dict)  #: functional coverage by group
     properties: Mapping[str, Property] = field(default_factory=dict)  #: by name
-    #: clocks that an input may be used with directly, and why; other inputs need a synchroniser
+    #: clocks that an input may be used with directly, and why; other inputs need a synchroniser.
+    #: Empty for a model of several FPGAs, whose crossings mean nothing
     inputs: Mapping[str, tuple[tuple[str, ...], str]] = field(default_factory=dict)
     #: clocks whose registers any other clock may sample, and why
     stable: Mapping[str, str] = field(default_factory=dict)

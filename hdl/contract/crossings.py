@@ -68,8 +68,8 @@ def crossings(design: Design) -> list[Crossing]:
 
 
 def _whole(name: str) -> str:
-    """A register's name without the number of a bit."""
-    return re.sub(r"\[\d+\]$", "", name)
+    """A register's name without the number of a bit, and without one that makes it unique."""
+    return re.sub(r"\$\d+|\[\d+\]$", "", name)
 
 
 class _Finder:

@@ -207,6 +207,7 @@ class _Bench:
                 seed=run.seed,
                 settings={
                     **simulator.frame_environment(*run.size),
+                    **self._parameters(run.size),
                     "HDL_COVERAGE": "" if waveform else str(self._folder / "points"),
                     "CONTRACT_PROGRESS": str(noted),
                     image.MODULE: self._design.image,
@@ -228,6 +229,10 @@ class _Bench:
                     return future.result(timeout=LOOK_S)
                 except TimeoutError:
                     continue
+
+    def _parameters(self, size: Size) -> dict[str, str]:
+        """All that a design of this size is made with, for the tests."""
+        return {k: str(v) for k, v in self._design.contract.parameters(size).items()}
 
     def waveform(self, failed: Result, runs: Sequence[Run], waves: Path) -> Path | None:
         """Repeat the failed check alone, with a waveform; None if none was written."""

@@ -75,6 +75,7 @@ DEVICE: "Device[CubeSenseBoard, CubeSense]" = Device(
     ),
     tops=get("cubestack.hdl.cubesense.tops:TOPS"),
     proofs=get("cubestack.hdl.proofs.cubesense:PROOFS"),
+    contract=get("cubestack.hdl.contract.cubesense.declared:CONTRACT"),
     wirings=get("cubestack.emulator.boards.cubesense.wiring:WIRINGS"),
     conformance=ConformanceNotes(
         keys=frozenset({"Area"}),

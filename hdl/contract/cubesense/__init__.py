@@ -1,0 +1,1 @@
+"""The contract of CubeSense's pair of FPGAs."""
