@@ -138,7 +138,7 @@ class Machine:
     def run(self, until_ps: int) -> Stop:
         """Run up to a time, or to a message that requires a stop.
 
-        After about a million instructions it returns early, with the reason TIME, so that the
+        After about half a million instructions it returns early, with the reason TIME, so that the
         caller can handle an interrupt; call it again. An asleep machine advances to its next event,
         or to ``until_ps``.
         """

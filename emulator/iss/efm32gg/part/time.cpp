@@ -75,9 +75,9 @@ void Part::perform_due(int64_t &steps) {
     }
 }
 
-// Bounds of the work of one run, a few hundredths of a second of wall time: the caller may then
+// Bounds of the work of one run, about a hundredth of a second of wall time: the caller may then
 // handle an interrupt, and continues.
-static constexpr int64_t MOST_INSTRUCTIONS = 1 << 20, MOST_STEPS = 1 << 16;
+static constexpr int64_t MOST_INSTRUCTIONS = 1 << 19, MOST_STEPS = 1 << 14;
 
 int64_t Part::run(int64_t until) {
     exits = 0;
