@@ -18,6 +18,8 @@ from cubestack.emulator.native.compiler import CompilerError, NoCompilerError, r
 from cubestack.firmware_model.formats.linux_i2c import MAX_MESSAGE_BYTES, SMBUS_DATA_BYTES, Call
 
 SOURCE = Path(__file__).with_name("shim.c")
+"""It includes the other files of C in its folder."""
+
 FLAGS = ("-std=gnu11", "-O2", "-fPIC", "-shared", "-Wall")
 LIBRARIES = ("-ldl", "-lpthread")
 """Separate libraries before glibc 2.34."""
@@ -86,7 +88,8 @@ def _key(compiler: list[str]) -> str:
     zig = version("ziglang") if "ziglang" in compiler else ""
     texts = (shlex.join(compiler), zig, platform.machine(), *FLAGS, *_definitions())
     digest = hashlib.sha256("\0".join(texts).encode())
-    digest.update(SOURCE.read_bytes())
+    for part in sorted(SOURCE.parent.glob("*.c")):
+        digest.update(part.read_bytes())
     return digest.hexdigest()[:24]
 
 

@@ -2,6 +2,7 @@
 
 import errno
 import os
+import shutil
 import stat
 import subprocess
 import sys
@@ -73,9 +74,11 @@ def test_shim_is_built_once_per_source(tmp_path, monkeypatch):
     with monkeypatch.context() as patch:
         patch.setattr(shim, "run_compiler", None)
         assert shim.shim_library(tmp_path) == library
-    source = tmp_path / "shim.c"
-    source.write_bytes(shim.SOURCE.read_bytes() + b"\n")
-    monkeypatch.setattr(shim, "SOURCE", source)
+    parts = shutil.copytree(shim.SOURCE.parent, tmp_path / "parts")
+    monkeypatch.setattr(shim, "SOURCE", parts / shim.SOURCE.name)
+    assert shim.shim_library(tmp_path) == library
+    with (parts / "listing.c").open("a") as part:
+        part.write("\n")
     assert shim.shim_library(tmp_path) != library
 
 
