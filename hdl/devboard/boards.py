@@ -48,13 +48,16 @@ class Board:
 
 
 def _ice40_pll(clk: Value, out: Value, locked: Value) -> Instance:
-    """24 MHz from 12 MHz: the oscillator runs at 12 x 64 = 768 MHz (iCE40 sysCLOCK PLL guide)."""
+    """12 MHz from 12 MHz: the oscillator runs at 12 x 64 = 768 MHz (iCE40 sysCLOCK PLL guide).
+
+    The lock signal starts the bridge.
+    """
     return Instance(
         "SB_PLL40_PAD",
         p_FEEDBACK_PATH="SIMPLE",
         p_DIVR=0,
         p_DIVF=63,
-        p_DIVQ=5,
+        p_DIVQ=6,
         p_FILTER_RANGE=1,
         i_PACKAGEPIN=clk,
         i_RESETB=1,
@@ -116,7 +119,7 @@ BOARDS: Mapping[str, Board] = {
             clk_mhz=12,
             rx_pin="6",
             tx_pin="9",
-            bridge_hz=24_000_000,
+            bridge_hz=12_000_000,
             pll=_ice40_pll,
         ),
         _ulx3s("85k"),

@@ -41,7 +41,7 @@ with its bitstream. Prints the port, and runs until it is interrupted. For a
 quick simulation build with a high --baud, at most half of the bridge's clock.
 
 examples:
-  cubestack hdl board icebreaker --top TOP --baud 12000000 --out out/board
+  cubestack hdl board icebreaker --top TOP --baud 6000000 --out out/board
   cubestack hdl board simulate out/board
   cubestack hdl board simulate out/board --mutant lut-bit"""
 

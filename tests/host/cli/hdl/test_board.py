@@ -14,7 +14,7 @@ from ....conftest import Run
         ([], "say which design: --top, one of cubestar, "),
         (["--top", "cubesense-sun"], "no top with cameras and memories; there are cubestar,"),
         (["--gateware", "x.v"], "--gateware needs --device"),
-        (["--top", "cubestar", "--baud", "5000000"], "the nearest rate is 4800000"),
+        (["--top", "cubestar", "--baud", "5000000"], "the nearest rate is 6000000"),
     ],
 )
 def test_wrong_call_is_one_line(arguments: list[str], words: str, run: Run, tmp_path: Path) -> None:
