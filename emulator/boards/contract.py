@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.emulator.boards.firmware import Insight
+from cubestack.emulator.boards.gateware import with_gateware
 from cubestack.emulator.bus.i2c import Forwarder, I2cBus, I2cTarget
 from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.faults.injector import Faults
@@ -17,6 +18,7 @@ from cubestack.emulator.faults.sites import Sites
 from cubestack.emulator.i2cdev.direct import DirectI2c
 from cubestack.emulator.ports.line import DirectSerial
 from cubestack.emulator.rtl.contract import RtlEngine
+from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.emulator.sim.fpga_port import Microcontroller
 from cubestack.emulator.sim.power import PowerModel, PowerTable
 from cubestack.emulator.sim.processor import Program
@@ -47,6 +49,8 @@ class BoardOptions(TypedDict, total=False):
     seed: int
     kernel: Kernel | None
     i2c_bus: I2cBus | None
+    gateware: str
+    gateware_param: str
 
 
 @dataclass(frozen=True)
@@ -105,6 +109,8 @@ class Board(ABC):
         seed: int = 0,
         kernel: Kernel | None = None,
         i2c_bus: I2cBus | None = None,
+        gateware: str = "",
+        gateware_param: str = "",
     ) -> None:
         """Power up.
 
@@ -113,10 +119,13 @@ class Board(ABC):
             seed: seed of all random numbers except the scene's, 0 or more.
             kernel: virtual time, which must be 0; by default a new one.
             i2c_bus: the satellite's bus, on the same kernel; by default a new one.
+            gateware: a user's design in place of the shipped one, see ``hdl.user``; empty for none.
+            gateware_param: its parameters, "NAME=VALUE,...".
 
         Raises:
             ValueError: the kernel's time is not 0, or the bus has another kernel.
         """
+        self._gateware = gateware, gateware_param
         self.kernel = kernel if kernel is not None else Kernel()
         if self.kernel.now:
             raise ValueError(f"a board is powered up at time 0, not at {self.kernel.now} ps")
@@ -207,6 +216,10 @@ class Board(ABC):
         """Places where faults can be injected; here those of all boards."""
         uarts, buses = {line.target: line.uart for line in self.lines}, {"i2c": self.i2c_bus}
         return Sites(self.kernel, self.processor, uarts, buses, self.power, self.engine)
+
+    def _fitted(self, wiring: Wiring) -> Wiring:
+        """``wiring`` with the design that the user has chosen, if any; see ``with_gateware``."""
+        return with_gateware(wiring, *self._gateware)
 
     def _node_link(self, link: Callable[[], NodeLink], baud: int, i2c_address: int) -> None:
         """Connect the satellite's serial line and I2C bus to the handlers from ``link``."""

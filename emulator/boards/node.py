@@ -124,7 +124,7 @@ class NodeBoard(Board, Generic[ProgramT, SceneT]):
         interface = self.program_type.interface
         wiring = self._wiring()
         if wiring is not None:
-            self.engine = make_engine(wiring, engine)
+            self.engine = make_engine(self._fitted(wiring), engine)
             for memory in self.engine.memories.values():
                 self._scramble(memory)
         elif engine != "auto":

@@ -142,13 +142,17 @@ class Wiring:
     bus: BusPins | None = None
     foreign: bool = False
 
-    def with_design(self, component: PinnedComponent) -> "Wiring":
-        """The same surroundings of a user's design, whose pixel clocks always have an effect."""
-        cameras = tuple(camera.name for camera in self.cameras)
+    def with_design(self, component: PinnedComponent, steady: Collection[str] = ()) -> "Wiring":
+        """The same surroundings of a user's design.
+
+        Pixel clocks of the cameras in ``steady`` have an effect while ``storing`` says so, those of
+        the others always.
+        """
+        others = {camera.name for camera in self.cameras} - {*steady}
         return replace(
             self,
             component=component,
-            storing=lambda _level: cameras,
+            storing=lambda level: (others | {*self.storing(level)}) if steady else others,
             stored=lambda _level: (),
             burst_levels=(),
             foreign=True,

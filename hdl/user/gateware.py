@@ -11,7 +11,8 @@ from cubestack.hdl.flow.generate import rtlil_text
 from cubestack.hdl.user.classes import make_component
 from cubestack.hdl.user.ports import UNCONNECTED
 from cubestack.hdl.user.source import ClassName, GatewareError, parse_source
-from cubestack.hdl.user.verilog import Parameters, convert_verilog
+from cubestack.hdl.user.stored import converted
+from cubestack.hdl.user.verilog import Parameters
 
 
 class Gateware(RtlilComponent):
@@ -68,7 +69,12 @@ class Gateware(RtlilComponent):
 
 
 def load_gateware(
-    text: str, pins: Iterable[Pin], parameters: Parameters | None = None, folder: Path | None = None
+    text: str,
+    pins: Iterable[Pin],
+    parameters: Parameters | None = None,
+    folder: Path | None = None,
+    *,
+    cache: Path | None = None,
 ) -> Gateware:
     """The design that ``text`` names, with the device's ``pins``.
 
@@ -78,6 +84,7 @@ def load_gateware(
         parameters: parameters of the top module, or keyword arguments of the class.
         folder: where relative paths start, and where a class's module may lie; by default the
             current folder.
+        cache: folder where converted designs are kept; None for none.
 
     Raises:
         GatewareError: the design can not be used; one line for each reason.
@@ -95,9 +102,9 @@ def load_gateware(
         )
         notices = _unconnected(source.name, further)
         return Gateware((*pins, *further), source.name, component=component, notices=notices)
-    converted = convert_verilog(source, pins, parameters)
-    notices = converted.notices + _unconnected(source.name, converted.pins[len(pins) :])
-    return Gateware(converted.pins, source.name, rtlil=converted.rtlil, notices=notices)
+    found = converted(source, pins, parameters, cache)
+    notices = found.notices + _unconnected(source.name, found.pins[len(pins) :])
+    return Gateware(found.pins, source.name, rtlil=found.rtlil, notices=notices)
 
 
 def _unconnected(title: str, further: Iterable[Pin]) -> tuple[str, ...]:

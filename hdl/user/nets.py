@@ -18,7 +18,7 @@ _SCOPE = re.compile(r"\\([^\\]+?)\.(?=[\\$])")
 def name_nets(netlist: Netlist) -> None:
     """Replace all names of nets; each output port becomes a copy of what drives it."""
     initial = _initial_levels(netlist)
-    registers = [*_registers(netlist)]
+    registers = [*registers_of(netlist)]
     _copy_outputs(netlist, {name for name, _ in registers})
     nets: dict[str, list[Bit]] = {
         name: port["bits"] for name, port in netlist.ports.items() if port["direction"] == "input"
@@ -87,7 +87,7 @@ def _copy_outputs(netlist: Netlist, registers: set[str]) -> None:
             port["bits"] = bits
 
 
-def _registers(netlist: Netlist) -> Iterator[tuple[str, list[Bit]]]:
+def registers_of(netlist: Netlist) -> Iterator[tuple[str, list[Bit]]]:
     """Bits of each register with its path in the source."""
     stored: dict[Bit, str] = {}  # scope of what stores it
     whole = set[tuple[Bit, ...]]()  # registers as the cells have them

@@ -10,6 +10,7 @@ from cubestack.firmware_model.values import whole
 from cubestack.host.cli.arguments import add_flag, add_path, add_value
 from cubestack.host.devices.device import (
     ENGINE_FORM,
+    GATEWARE_OPTIONS,
     PROFILE_OPTIONS,
     AnyDevice,
     BoardOption,
@@ -70,13 +71,22 @@ def add_board_arguments(parser: argparse.ArgumentParser) -> None:
     for device in devices():
         for option in device.options:
             add_option(parser, option, f"{device.name}: ")
-    for option in PROFILE_OPTIONS:
+    for option in (*GATEWARE_OPTIONS, *PROFILE_OPTIONS):
         add_option(parser, option)
 
 
 def add_option(parser: argparse.ArgumentParser, option: BoardOption, prefix: str = "") -> None:
     """Declare one of them; ``prefix`` goes before its help."""
-    add_value(parser, option.name, option, default=None, help=prefix + option.meaning)
+    how = {"action": _Joined} if option.repeats else {}
+    add_value(parser, option.name, option, default=None, help=prefix + option.meaning, **how)
+
+
+class _Joined(argparse.Action):
+    """Joins the values of a repeated option by commas."""
+
+    def __call__(self, _parser: Any, args: argparse.Namespace, value: Any, _name: Any = "") -> None:
+        before = getattr(args, self.dest)
+        setattr(args, self.dest, value if before is None else f"{before},{value}")
 
 
 def given_options(args: argparse.Namespace) -> dict[str, Any]:

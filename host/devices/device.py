@@ -85,6 +85,7 @@ class BoardOption(Declaration):
         notice: what a user must know of a value, or None.
         known: texts that have a meaning of their own.
         unset: what it means when it is empty, a word or two for lists.
+        repeats: whether the command line joins several by commas.
     """
 
     name: str
@@ -95,6 +96,7 @@ class BoardOption(Declaration):
     notice: Callable[[str], str | None] = lambda _value: None
     known: tuple[str, ...] = ()
     unset: str = ""
+    repeats: bool = False
 
     def __post_init__(self) -> None:
         kind = ValueKind("file", "a file", _file, str) if self.is_file else TEXT
@@ -110,6 +112,26 @@ class BoardOption(Declaration):
         """As the command line has it."""
         return option_string(self.name)
 
+
+#: Options of every device with an FPGA.
+GATEWARE_OPTIONS = (
+    BoardOption(
+        "gateware",
+        "your own FPGA design in place of the shipped one: Verilog files, a folder, a file list "
+        "(*.f), or an Amaranth class (docs/own-gateware.md)",
+        default="",
+        metavar="FILE[:TOP]|MODULE:CLASS",
+        unset="the shipped design",
+    ),
+    BoardOption(
+        "gateware_param",
+        "parameter of that design; may be repeated",
+        default="",
+        metavar="NAME=VALUE",
+        unset="its defaults",
+        repeats=True,
+    ),
+)
 
 #: Options of every device that has switches.
 PROFILE_OPTIONS = (
@@ -260,8 +282,11 @@ class Device(Generic[BoardT_co, ClientT_co]):
 
     @property
     def all_options(self) -> tuple[BoardOption, ...]:
-        """Options of its board, and those that choose its profile."""
-        return (*self.options, *(PROFILE_OPTIONS if self.switches.declared() else ()))
+        """Options of its board, and those that choose its gateware and its profile."""
+        own = {option.name for option in self.options}
+        gateware = [one for one in GATEWARE_OPTIONS if self.has_fpga and one.name not in own]
+        profile = PROFILE_OPTIONS if self.switches.declared() else ()
+        return (*self.options, *gateware, *profile)
 
     def study(self, command: str) -> Any:
         """What it offers to a study, or None."""

@@ -124,9 +124,8 @@ class CubeSenseBoard(Board):
             common: seed, kernel and i2c_bus, see ``Board``.
         """
         super().__init__(CUBESENSE_POWER, **common)
-        self.engine = make_engine(
-            wiring_of(switches.gateware, mcu_addressing=mcu_addressing), engine
-        )
+        wiring = wiring_of(switches.gateware, mcu_addressing=mcu_addressing)
+        self.engine = make_engine(self._fitted(wiring), engine)
         drawn = switches.lens == "residuals"
         self.cameras = {
             Camera[target.name]: Ov7620(

@@ -66,7 +66,7 @@ class CubeStarStack(Board):
         """Power up all but the processor; arguments as for ``CubeStarBoard``."""
         self.layout = BOARDS[layout]
         super().__init__(self.layout.power, **common)
-        self.engine = make_engine(_wiring(layout), kind=engine)
+        self.engine = make_engine(self._fitted(_wiring(layout)), kind=engine)
         self.camera = Mlx75412(scene, seed=self.seed)
         ram_bytes = EXTERNAL_RAM_BYTES if self.layout.external_ram else 0
         self.external_ram = np.zeros(ram_bytes, np.uint8)
