@@ -2,15 +2,20 @@
 
 import json
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
+from functools import partial
+from typing import Any
 
 from cubestack.emulator.native.cache import cache_folder, hash_of
-from cubestack.emulator.rtl.wiring import CameraPins, Wiring
+from cubestack.emulator.rtl.wiring import CameraPins, Level, Wiring
+from cubestack.firmware_model.interface.pins import Pin
+from cubestack.hdl.blocks.pinned import RtlilComponent, Stride
 from cubestack.hdl.flow.generate import design_hash
 from cubestack.hdl.flow.tools import ToolMissingError
 from cubestack.hdl.user import Gateware, GatewareError, load_gateware
 from cubestack.hdl.user.idle import IdleVerdict, cubes_without, prove_idle
 from cubestack.hdl.user.stored import source_hash, write_whole
+from cubestack.hdl.user.strides import proved_strides, stride_fields, stride_of
 
 
 class GatewareNotice(UserWarning):
@@ -27,49 +32,94 @@ def with_gateware(wiring: Wiring, text: str, parameters: str = "") -> Wiring:
         if parameters:
             raise GatewareError("gateware_param needs a design of your own: choose one by gateware")
         return wiring
-    gateware = load(wiring, text, parameters)
-    return wiring.with_design(gateware, _steady_cameras(wiring, gateware))
+    gateware = load(text, wiring.component.pins, parameters)
+    gateware.use_strides(_strides(wiring, gateware))
+    return fitted(wiring, gateware)
 
 
-def _steady_cameras(wiring: Wiring, gateware: Gateware) -> list[str]:
-    """Cameras whose clocks provably have no effect while the shipped design would not store."""
-    found = []
-    for camera in wiring.cameras:
-        verdict = _verdict(wiring, gateware, camera)
+def fitted(wiring: Wiring, gateware: RtlilComponent) -> Wiring:
+    """``wiring`` with a user's design; warns of clocks that have to be simulated all the time."""
+    conditions = {
+        camera.name: _condition(wiring, gateware, camera, stacklevel=4) for camera in wiring.cameras
+    }
+
+    def storing(level: Level) -> Collection[str]:
+        return [name for name, may_store in conditions.items() if may_store(level)]
+
+    return wiring.with_design(gateware, storing)
+
+
+def _condition(
+    wiring: Wiring, gateware: RtlilComponent, camera: CameraPins, stacklevel: int
+) -> Callable[[Level], bool]:
+    """When the camera's clock may have an effect: as for the shipped design if that is proved.
+
+    Else, if that is proved, for as long as the shipped design's command lasts, after it is done;
+    else at any time.
+    """
+
+    def commanded(level: Level) -> Collection[str]:
+        return wiring.storing(lambda pin: 0 if pin in wiring.acknowledges else level(pin))
+
+    for storing in (wiring.storing, commanded):
+        verdict = _verdict(wiring, gateware, camera, storing)
         if verdict.proved:
-            found.append(camera.name)
-        else:
-            warnings.warn(
-                f"{gateware.title}: {camera.clock} may have an effect at any time "
-                f"({verdict.moves}), so each of its clocks is simulated, which is slower",
-                GatewareNotice,
-                stacklevel=5,
-            )
-    return found
+            return partial(_names, camera.name, storing)
+    warnings.warn(
+        f"{gateware.title}: {camera.clock} may have an effect at any time ({verdict.moves}), "
+        "so each of its clocks is simulated, which is slower",
+        GatewareNotice,
+        stacklevel=stacklevel,
+    )
+    return lambda _level: True
 
 
-def _verdict(wiring: Wiring, gateware: Gateware, camera: CameraPins) -> IdleVerdict:
-    """From the cache, or proved now; not proved without a whole Yosys."""
-    cubes = cubes_without(camera.name, wiring.storing)
+def _names(camera: str, storing: Callable[[Level], Collection[str]], level: Level) -> bool:
+    return camera in storing(level)
+
+
+def _verdict(
+    wiring: Wiring,
+    gateware: RtlilComponent,
+    camera: CameraPins,
+    storing: Callable[[Level], Collection[str]],
+) -> IdleVerdict:
+    cubes = cubes_without(camera.name, storing)
     masked = {memory["D_O"]: memory["D_OE"] for memory in wiring.memories}
-    call = f"{design_hash(gateware)} {camera.pins} {cubes} {masked} {source_hash()}"
-    file = cache_folder() / "gateware" / f"{hash_of(call.encode())}.idle"
+    call = f"{design_hash(gateware)} {camera.pins} {cubes} {masked}"
     try:
-        return IdleVerdict(*json.loads(file.read_text(encoding="utf-8")))
-    except (OSError, ValueError, TypeError):
-        pass
-    try:
-        verdict = prove_idle(gateware, camera.pins, cubes, masked)
+        found = _kept(call, lambda: prove_idle(gateware, camera.pins, cubes, masked))
     except ToolMissingError as error:
         return IdleVerdict(False, f"no proof: {error}")
-    write_whole(file, json.dumps(verdict))
-    return verdict
+    return IdleVerdict(*found)
 
 
-def load(wiring: Wiring, text: str, parameters: str = "") -> Gateware:
-    """The design with the pins of ``wiring``; warns and raises as :func:`with_gateware`."""
+def _strides(wiring: Wiring, gateware: Gateware) -> list[Stride]:
+    """Those of the shipped design that are proved of the user's; none without a whole Yosys."""
+    shipped = wiring.component
+    call = f"{design_hash(gateware)} {shipped.strides}"
+    try:
+        found = _kept(call, lambda: [*map(stride_fields, proved_strides(gateware, shipped))])
+    except ToolMissingError:
+        return []
+    return [stride_of(fields) for fields in found]
+
+
+def _kept(call: str, compute: Callable[[], Any]) -> Any:
+    """What ``compute`` returns, as JSON has it; from the cache if it was computed before."""
+    file = cache_folder() / "gateware" / f"{hash_of(f'{call} {source_hash()}'.encode())}.json"
+    try:
+        return json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        found = compute()
+        write_whole(file, json.dumps(found))
+        return found
+
+
+def load(text: str, pins: Iterable[Pin], parameters: str = "") -> Gateware:
+    """The design that ``text`` names, with ``pins``; warns and raises as :func:`with_gateware`."""
     given, folder = parse_parameters(parameters), cache_folder() / "gateware"
-    gateware = load_gateware(text, wiring.component.pins, given, cache=folder)
+    gateware = load_gateware(text, pins, given, cache=folder)
     for notice in gateware.notices:
         warnings.warn(notice, GatewareNotice, stacklevel=4)
     return gateware

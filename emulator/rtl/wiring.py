@@ -142,17 +142,19 @@ class Wiring:
     bus: BusPins | None = None
     foreign: bool = False
 
-    def with_design(self, component: PinnedComponent, steady: Collection[str] = ()) -> "Wiring":
+    def with_design(
+        self, component: PinnedComponent, storing: Callable[[Level], Collection[str]] | None = None
+    ) -> "Wiring":
         """The same surroundings of a user's design.
 
-        Pixel clocks of the cameras in ``steady`` have an effect while ``storing`` says so, those of
-        the others always.
+        ``storing`` is as in the attributes, and must be proved of the design; by default all pixel
+        clocks may change something at any time.
         """
-        others = {camera.name for camera in self.cameras} - {*steady}
+        cameras = tuple(camera.name for camera in self.cameras)
         return replace(
             self,
             component=component,
-            storing=lambda level: (others | {*self.storing(level)}) if steady else others,
+            storing=storing or (lambda _level: cameras),
             stored=lambda _level: (),
             burst_levels=(),
             foreign=True,

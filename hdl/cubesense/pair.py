@@ -10,6 +10,7 @@ from cubestack.firmware_model.interface.cubesense import pins
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, ReadOut
 from cubestack.firmware_model.interface.pins import resized
 from cubestack.hdl.blocks.pinned import PinnedComponent, connect_ports
+from cubestack.hdl.cubesense.dataflow import Side
 from cubestack.hdl.cubesense.top import CubeSenseFpga
 
 #: Ports that each FPGA has separately; in the pair their names have the prefix SUN_ or NAD_.
@@ -39,10 +40,13 @@ class CubeSensePair(PinnedComponent):
             resized(pins.pair_pins(mcu_addressing), SUN_SRAM_A=width, NAD_SRAM_A=width)
         )
 
+    def _fpga(self, side: Side) -> PinnedComponent:
+        return CubeSenseFpga(side, self.read_out, self.mcu_addressing)
+
     def elaborate(self, platform: object) -> Module:
         m = Module()
-        m.submodules.sun = sun = CubeSenseFpga("sun", self.read_out, self.mcu_addressing)
-        m.submodules.nadir = nadir = CubeSenseFpga("nadir", self.read_out, self.mcu_addressing)
+        m.submodules.sun = sun = self._fpga("sun")
+        m.submodules.nadir = nadir = self._fpga("nadir")
         common = [*pins.COMMON_PINS, *(pins.DATA_I,) * self.mcu_addressing]
         for prefix, fpga in zip(pins.PREFIXES.values(), (sun, nadir), strict=True):
             own = [(name, prefix + name) for name in OWN_PORTS]

@@ -25,12 +25,13 @@ def stride_proof(make: Make, name: str, fault: StuckWire) -> Proof:
     return Proof(
         "Inside a row each clock takes a byte to or from the next address, and does nothing else",
         stride_design,
-        _each_clock,
+        each_clock,
         fault,
     )
 
 
-def _each_clock(m: Module, d: SimpleNamespace) -> None:
+def each_clock(m: Module, d: SimpleNamespace) -> None:
+    """Assertions of the stride ``d.size.stride`` of a design with the ports ``d.size.members``."""
     stride: Stride = d.size.stride
     registers = {register.name: register.value for register in d.registers}
     counter, data = registers[stride.counter], registers[stride.data]

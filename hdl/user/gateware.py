@@ -34,6 +34,7 @@ class Gateware(RtlilComponent):
     ) -> None:
         super().__init__(pins)
         self.notices = notices
+        self._strides: tuple[Stride, ...] = ()
         self._title, self._rtlil, self._component = title, rtlil, component
 
     @property
@@ -46,7 +47,11 @@ class Gateware(RtlilComponent):
 
     @property
     def strides(self) -> tuple[Stride, ...]:
-        return ()
+        return self._strides
+
+    def use_strides(self, proved: Iterable[Stride]) -> None:
+        """Declare strides, which must be proved of this design."""
+        self._strides = tuple(proved)
 
     def rtlil(self, name: str) -> str:
         """Its RTLIL, with the module ``name`` as the top."""

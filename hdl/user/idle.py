@@ -24,7 +24,7 @@ LIMIT = 60
 Cube = Mapping[str, int]
 """Levels of some pins of one bit."""
 
-_FLATTEN = """
+FLATTEN = """
 read_rtlil design.il
 hierarchy -top top
 proc
@@ -97,7 +97,7 @@ def prove_idle(
     ``data_outputs`` are outputs whose level has no effect while another output, the enable, is 0.
     Raises ToolMissingError without a Yosys.
     """
-    _, text = yosys_files(_FLATTEN, {"design.il": rtlil_text(component)}, "flat.json")
+    _, text = yosys_files(FLATTEN, {"design.il": rtlil_text(component)}, "flat.json")
     netlist = Netlist(json.loads(text)["modules"]["top"])
     names, reads = _expose(netlist)
     harness = _harness(component, netlist, [*camera_pins], cubes, data_outputs, reads)

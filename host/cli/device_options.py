@@ -70,7 +70,8 @@ def add_board_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options that one device's board alone has, of all registered devices."""
     for device in devices():
         for option in device.options:
-            add_option(parser, option, f"{device.name}: ")
+            if option.name not in {common.name for common in GATEWARE_OPTIONS}:
+                add_option(parser, option, f"{device.name}: ")
     for option in (*GATEWARE_OPTIONS, *PROFILE_OPTIONS):
         add_option(parser, option)
 

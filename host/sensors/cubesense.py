@@ -1,9 +1,20 @@
 """CubeSense as a registered device."""
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from cubestack.firmware_model.interface.cubesense import INTERFACE
-from cubestack.host.devices.device import BoardOption, ConformanceNotes, Device, Report
+from cubestack.firmware_model.interface.cubesense.switches import (
+    DEFAULT_SWITCHES,
+    CubeSenseSwitches,
+)
+from cubestack.host.devices.device import (
+    GATEWARE_OPTIONS,
+    BoardOption,
+    ConformanceNotes,
+    Device,
+    Report,
+)
 from cubestack.host.devices.registry import call, get
 
 if TYPE_CHECKING:
@@ -15,10 +26,22 @@ if TYPE_CHECKING:
 STUDIES = "cubestack.host.studies.cubesense"
 
 
-def _open_board(scene: "EarthSunScene | EarthSunView", **common: Any) -> "CubeSenseBoard":
+#: Shipped variants of the FPGAs.
+VARIANTS = CubeSenseSwitches.declared()["gateware"].choices
+
+
+def _open_board(
+    scene: "EarthSunScene | EarthSunView",
+    *,
+    gateware: str = "",
+    switches: CubeSenseSwitches = DEFAULT_SWITCHES,
+    **common: Any,
+) -> "CubeSenseBoard":
     from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
 
-    return CubeSenseBoard(scene, **common)
+    if gateware in VARIANTS:
+        gateware, switches = "", replace(switches, gateware=gateware)
+    return CubeSenseBoard(scene, gateware=gateware, switches=switches, **common)
 
 
 DEVICE: "Device[CubeSenseBoard, CubeSense]" = Device(
@@ -65,6 +88,14 @@ DEVICE: "Device[CubeSenseBoard, CubeSense]" = Device(
     options=(
         BoardOption(
             "mcu_addressing", "FPGA variant whose addresses the processor can set (telecommand 100)"
+        ),
+        replace(
+            GATEWARE_OPTIONS[0],
+            meaning=f"a shipped variant of the FPGAs ({', '.join(VARIANTS)}) as --set gateware, or "
+            "your own design of the pair, or of one FPGA: sun=..., nadir=... "
+            "(docs/own-gateware.md)",
+            metavar="VARIANT|FILE[:TOP]|MODULE:CLASS",
+            known=VARIANTS,
         ),
         BoardOption(
             "uart",

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from cubestack.emulator.boards.contract import Board, BoardOptions
 from cubestack.emulator.boards.cubesense.processor import GpioPins, Pic18f45k20
-from cubestack.emulator.boards.cubesense.wiring import cubesense_wiring
+from cubestack.emulator.boards.cubesense.wiring import cubesense_wiring, with_designs
 from cubestack.emulator.bus.i2c import Forwarder
 from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.ov7620.lens_error import FIELD_DEG, NOMINAL, draw_lens
@@ -125,7 +125,7 @@ class CubeSenseBoard(Board):
         """
         super().__init__(CUBESENSE_POWER, **common)
         wiring = wiring_of(switches.gateware, mcu_addressing=mcu_addressing)
-        self.engine = make_engine(self._fitted(wiring), engine)
+        self.engine = make_engine(with_designs(wiring, *self._gateware), engine)
         drawn = switches.lens == "residuals"
         self.cameras = {
             Camera[target.name]: Ov7620(

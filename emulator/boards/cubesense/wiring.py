@@ -1,13 +1,19 @@
 """Wiring of CubeSense's two FPGAs."""
 
+import re
 from collections.abc import Callable, Collection, Mapping
 from functools import cache, partial
 
+from cubestack.emulator.boards.gateware import fitted, load, with_gateware
 from cubestack.emulator.rtl.wiring import CameraPins, Level, MemoryPins, Wiring
 from cubestack.firmware_model.interface.cubesense import pins
 from cubestack.firmware_model.interface.cubesense.fpga import COMMANDS, Action, actions
 from cubestack.firmware_model.interface.cubesense.pins import CONTROLS, PREFIXES
+from cubestack.hdl.blocks.pinned import RtlilComponent
+from cubestack.hdl.cubesense.dataflow import SIDES, Side
+from cubestack.hdl.cubesense.foreign_pair import ForeignPair
 from cubestack.hdl.cubesense.pair import CubeSensePair
+from cubestack.hdl.cubesense.top import CubeSenseFpga
 
 
 def cubesense_wiring(pair: CubeSensePair | None = None, *, mcu_addressing: bool = False) -> Wiring:
@@ -46,6 +52,27 @@ def cubesense_wiring(pair: CubeSensePair | None = None, *, mcu_addressing: bool 
             if {Action.STORE, Action.STORE_OTHER} & {*command.actions}
         ),
     )
+
+
+def with_designs(wiring: Wiring, text: str, parameters: str = "") -> Wiring:
+    """``wiring`` with a user's designs; see ``with_gateware``.
+
+    ``text`` names a design of the whole pair, or is "sun=DESIGN", "nadir=DESIGN", or both with a
+    comma between: each for one FPGA, whose ports are those of ``CubeSenseFpga``.
+    """
+    parts = [part.partition("=") for part in re.split(r",(?=(?:sun|nadir)=)", text)]
+    if any(side not in SIDES for side, _, _ in parts):
+        return with_gateware(wiring, text, parameters)
+    pair = wiring.component
+    assert isinstance(pair, CubeSensePair)
+    shape = pair.read_out, pair.mcu_addressing
+    designs: dict[Side, RtlilComponent] = {
+        side: load(design, CubeSenseFpga(side, *shape).pins, parameters)
+        for side in SIDES
+        for name, _, design in parts
+        if name == side
+    }
+    return fitted(wiring, ForeignPair(designs, *shape))
 
 
 @cache

@@ -100,6 +100,6 @@ def _rig_of(gateware: str) -> Rig:
 EXPERIMENT = UpsetExperiment(
     lambda options: _rig_of(options.gateware),
     __doc__,
-    decides=("profile", "set", "mcu_addressing", "uart"),
+    decides=("profile", "set", "gateware", "gateware_param", "mcu_addressing", "uart"),
     options=CubeSenseUpsetOptions,
 )

@@ -19,11 +19,12 @@ import numpy as np
 
 from cubestack.emulator.boards.cubestar.board import CubeStarBoard
 from cubestack.emulator.boards.cubestar.layouts import BOARDS
+from cubestack.emulator.boards.gateware import with_gateware
 from cubestack.emulator.camera.mlx75412.lens import CONDITION
 from cubestack.emulator.rtl.contract import RtlEngine
 from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.firmware_model.interface.cubestar.pins import BOARD_PREFIXES, ENABLE, RNW, Layout
-from cubestack.firmware_model.values import choice
+from cubestack.firmware_model.values import choice, text
 from cubestack.host.clients.cubestar.client import CubeStar
 from cubestack.host.emulation.emulated import EmulatedDevice
 from cubestack.host.experiments import attitude as attitudes
@@ -86,27 +87,32 @@ class CubeStarUpsetOptions(UpsetOptions):
         "memory layout, and the gateware for it (default 1, the published one)",
         tuple(layout.value for layout in Layout),
     )
-
-
-def _wiring(layout: Layout) -> Wiring:
-    return BOARDS[layout].wiring()
+    gateware: str = text(
+        "", "your own FPGA design (docs/own-gateware.md)", metavar="FILE[:TOP]|MODULE:CLASS"
+    )
+    gateware_param: str = text("", "its parameters", metavar="NAME=VALUE,...")
 
 
 @cache
-def _rig_of(layout: Layout) -> Rig:
+def _wiring(layout: Layout, gateware: str, gateware_param: str) -> Wiring:
+    return with_gateware(BOARDS[layout].wiring(), gateware, gateware_param)
+
+
+@cache
+def _rig_of(layout: Layout, gateware: str, gateware_param: str) -> Rig:
     subject = Subject(_scene, _start, _judge, _state, row_bytes=1024, ready=wait_started)
     return Rig(
         (subject,),
-        partial(_wiring, layout),
+        partial(_wiring, layout, gateware, gateware_param),
         PHASES[layout],
         MEMORIES[layout],
-        {"layout": layout.value},
+        {"layout": layout.value, "gateware": gateware, "gateware_param": gateware_param},
     )
 
 
 EXPERIMENT = UpsetExperiment(
-    lambda options: _rig_of(Layout(options.layout)),
+    lambda options: _rig_of(Layout(options.layout), options.gateware, options.gateware_param),
     __doc__,
-    decides=("layout",),
+    decides=("layout", "gateware", "gateware_param"),
     options=CubeStarUpsetOptions,
 )
