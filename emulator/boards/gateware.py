@@ -38,7 +38,7 @@ def with_gateware(wiring: Wiring, text: str, parameters: str = "") -> Wiring:
 
 
 def fitted(wiring: Wiring, gateware: RtlilComponent) -> Wiring:
-    """``wiring`` with a user's design; warns of clocks that have to be simulated all the time."""
+    """``wiring`` with a user's design; warns of clocks that must be simulated all the time."""
     conditions = {
         camera.name: _condition(wiring, gateware, camera, stacklevel=4) for camera in wiring.cameras
     }
