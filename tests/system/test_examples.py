@@ -67,9 +67,10 @@ def test_flight_driver_reports_a_missing_port(flight_driver: Path) -> None:
     assert (done.returncode, done.stderr) == (1, "flight_driver: No such file or directory\n")
 
 
-def test_smbus2_example_prints_the_attitude(device: Any, capfd: pytest.CaptureFixture[str]) -> None:
-    assert device.run_on_i2c(sys.executable, HERE / "smbus2_attitude.py", "7").returncode == 0
-    check_attitude(device, capfd.readouterr().out)
+def test_smbus2_example_prints_the_attitude(device: Any) -> None:
+    done = device.run_on_i2c(sys.executable, HERE / "smbus2_attitude.py", "7")
+    assert done.returncode == 0
+    check_attitude(device, done.stdout)
 
 
 def test_bringup_example_passes_all_six_steps(device: Any) -> None:
