@@ -64,7 +64,7 @@ INPUTS = {
     "ENABLE": (("DCLK",), _PROCESSOR),
     "RNW": (("DCLK", "ENABLE"), _PROCESSOR),
     "BANK": (("DCLK", "ENABLE"), "stable around the rising ENABLE"),
-    "SRAM_D_I": (("DCLK",), "the SRAM follows the address, which DCLK sets"),
+    "SRAM_D_I": (("DCLK", "PIXCLK"), "the SRAM follows the address, which that clock sets"),
 }
 
 

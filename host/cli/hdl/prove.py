@@ -23,7 +23,7 @@ planted bug, which it must find. Needs the extra hdl; all proofs take one to two
 minutes.
 
 With --device: prove the device's contract at the pins of a design of yours, or
-of the shipped one without FILE. Each property is proved for any run time, holds
+of the shipped one without FILE. Each property is proved for any run time,
 holds for a number of clocks from power-up, or is refuted. Then the netlist is
 searched for registers that sample an asynchronous signal.
 
