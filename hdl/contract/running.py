@@ -140,7 +140,7 @@ def _after(told: Told, before: int, total: int) -> Callable[[str, int], None]:
 
 def check_tools(simulator: str) -> None:
     if find_spec("cocotb") is None:
-        raise ToolMissingError("cocotb is not installed; try: pip install 'cubestack[hdl]'")
+        raise ToolMissingError("cocotb is not installed; try: pip install 'cocotb>=2,<3'")
     if simulator == "icarus" and shutil.which("iverilog") is None:
         raise ToolMissingError(
             "Icarus Verilog is not installed; try: apt-get install iverilog, "
