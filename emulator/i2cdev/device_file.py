@@ -24,7 +24,8 @@ _LAST_7_BIT = 0x7F
 _LAST_10_BIT = 0x3FF
 _INT_MAX = 0x7FFF_FFFF
 _KNOWN_FLAGS = int(MessageFlag.READ | MessageFlag.DMA_SAFE | MessageFlag.RECEIVE_LENGTH)
-MODE_FLAGS = os.O_ACCMODE | os.O_PATH
+O_PATH = getattr(os, "O_PATH", 0)  # Linux only
+MODE_FLAGS = os.O_ACCMODE | O_PATH
 """The flags of open(2) that decide which calls a file allows."""
 
 _U64 = struct.Struct("=Q")
@@ -75,7 +76,7 @@ class DeviceFile:
 
     def _allows(self, call: Call) -> bool:
         """Whether the flags of open allow ``call``; ioctl needs neither reading nor writing."""
-        if self.mode & os.O_PATH:
+        if self.mode & O_PATH:
             return False
         match call:
             case Call.READ:
