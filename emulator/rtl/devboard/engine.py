@@ -6,6 +6,7 @@ each, of which several are on their way at once; see :mod:`firmware_model.interf
 
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
+from logging import INFO, WARNING, getLogger
 from typing import NamedTuple
 
 import numpy as np
@@ -32,6 +33,8 @@ from cubestack.firmware_model.interface.devboard import (
 )
 from cubestack.firmware_model.interface.devboard.outputs import apply_deviation
 from cubestack.firmware_model.interface.devboard.table import MOST_EDGES
+
+_log = getLogger(__name__)
 
 _READ = 1024
 """Bytes of the memory in one request."""
@@ -79,6 +82,10 @@ class DevboardEngine(SteppedEngine):
 
     def close(self) -> None:
         self.link.close()
+        counters = self.link.counters
+        text = "board on %s: %d frames, %d repeated; %d bytes sent, %d received"
+        numbers = counters.frames, counters.repeated, counters.sent, counters.received
+        _log.log(WARNING if counters.repeated else INFO, text, self.link.name, *numbers)
 
     # --- single pins ------------------------------------------------------------------------------
 
