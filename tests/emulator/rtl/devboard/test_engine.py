@@ -24,9 +24,7 @@ SIZE = (16, 6)
 BOARD = cubestar_wiring(CubeStarTop(*SIZE))
 
 
-@pytest.mark.parametrize(
-    "name", quick_ones(BOARDS, "cubestar-shared")
-)
+@pytest.mark.parametrize("name", quick_ones(BOARDS, "cubestar-shared"))
 def test_pins_agree_over_random_events(name: str) -> None:
     board = BOARDS[name]
     wiring = board.wiring(False)
