@@ -97,6 +97,25 @@ def hello(nonce: int = 0) -> Request:
     return Request(Code.HELLO, OPERATIONS[Code.HELLO].request(nonce=nonce))
 
 
+def frame_requests() -> Iterator[Request]:
+    """Two images of the small design with rows that are too long or too short, and a read-out."""
+    yield hello()
+    blank = Request(Code.RUN, bytes([0, 0, 0, 0, 8, 0]))
+    yield Request(Code.STEPS, bytes([Step.SET | 2, 0b100]))  # ENABLE
+    for rows in ((10, 5, 8, 3), (8, 10, 8, 12)):
+        for levels in (0b100, 0b110):  # VSYNC
+            yield Request(Code.STEPS, bytes([Step.SET | 2, levels]))
+            yield blank
+        for row, length in enumerate(rows):
+            pixels = bytes(37 * n + 90 * row & 0xFF for n in range(length))
+            yield Request(Code.STORE, bytes(2) + pixels)
+            yield blank
+            yield blank
+    for levels in (0b10, 0b1010, 0b1110):  # RNW instead
+        yield Request(Code.STEPS, bytes([Step.SET | 2, levels]))
+    yield Request(Code.READ, bytes([0, 1, 0]) + bytes(53 * n & 0xFF for n in range(40)))
+
+
 #: Bits of the input bytes that must change one at a time: clocks and what they sample.
 SINGLE = (0b1, 0, 0b111111, 0)
 

@@ -17,7 +17,7 @@ from cubestack.hdl.devboard.netlist import MUTANTS, FlipFlop, Lut, Netlist, Netl
 from cubestack.hdl.devboard.netlist.cpp import board_header, expression
 from cubestack.hdl.flow.tools import have_placer, have_yosys
 from tests.hdl.devboard import exchange
-from tests.hdl.devboard.exchange import compare, hello, random_requests
+from tests.hdl.devboard.exchange import compare, frame_requests, hello, random_requests
 
 needs_tools = pytest.mark.skipif(
     not (have_yosys() and have_placer("ice40") and have_placer("ecp5")),
@@ -95,14 +95,22 @@ def test_placed_netlist_answers_as_the_model(name: str, build_folder: Path) -> N
     assert compare(model, board, random_requests(random, 1000, model), random) == 1000
 
 
+def differs(place: Path, timing: BridgeTiming, mutant: str, seed: int) -> bool:
+    board, fault = netlist_board(place, mutant, seed)
+    assert fault
+    model, random = exchange.model(timing), Random(5)
+    requests = itertools.chain(frame_requests(), random_requests(random, 300, model))
+    try:
+        compare(model, board, requests, random)
+    except AssertionError:
+        return True
+    return False
+
+
 @needs_tools
 @pytest.mark.slow
 @pytest.mark.parametrize("mutant", MUTANTS)
-def test_random_requests_find_a_fault_in_the_netlist(mutant: str, build_folder: Path) -> None:
+def test_requests_find_a_fault_in_the_netlist(mutant: str, build_folder: Path) -> None:
+    # Some faults change nothing, such as a bit of a table that no state of the design selects.
     place, timing = built(build_folder, "icebreaker")
-    board, fault = netlist_board(place, mutant, seed=1)
-    assert fault
-    model, random = exchange.model(timing), Random(5)
-    requests = itertools.chain([hello()], random_requests(random, 1000, model))
-    with pytest.raises(AssertionError):
-        compare(model, board, requests, random)
+    assert any(differs(place, timing, mutant, seed) for seed in (1, 3, 5, 7))
