@@ -11,8 +11,8 @@ from cubestack.hdl.contract.cubesense.bench import LATENCY, SIDES, PairBench
 from cubestack.hdl.contract.cubesense.points import hit
 from cubestack.hdl.contract.testing import contract_test
 
-#: So much of an image is enough where no whole one is needed.
-PART = min(GEOMETRY.pixels, 2 * GEOMETRY.columns)
+#: So much of an image, never a whole one.
+PART = min(GEOMETRY.pixels - 1, 2 * GEOMETRY.columns)
 
 
 @contract_test()

@@ -12,7 +12,10 @@ module full_frame;
     localparam COLUMN_BITS = $clog2(COLUMNS);
     localparam POSITION_BITS = COLUMN_BITS + $clog2(ROWS);
 
-    reg ENABLE = 0, RNW = 0, BANK = 0, PIXCLK = 0, HSYNC = 0, VSYNC = 0, DCLK = 0;
+    // Unknown at first, so that there is an edge into standby: it resets without initial values.
+    reg ENABLE = 1'bx, RNW = 1'bx;
+    initial #1 begin ENABLE = 0; RNW = 0; end
+    reg BANK = 0, PIXCLK = 0, HSYNC = 0, VSYNC = 0, DCLK = 0;
     reg [7:0] PIXDATA = 0;
     wire ACK, SRAM_D_OE, SRAM_CE_N, SRAM_OE_N, SRAM_WE_N;
     wire [7:0] DATA, SRAM_D_O;

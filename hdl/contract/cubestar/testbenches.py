@@ -16,8 +16,8 @@ from cubestack.hdl.contract.testing import contract_test
 COLUMNS, ROWS = GEOMETRY
 BANKS = (0, 1)
 
-#: So much of an image is enough where no whole one is needed.
-PART = min(GEOMETRY.pixels, 2 * COLUMNS + 5)
+#: So much of an image, never a whole one.
+PART = min(GEOMETRY.pixels - 1, 2 * COLUMNS + 5)
 
 
 @contract_test()
