@@ -118,7 +118,7 @@ GATEWARE_OPTIONS = (
     BoardOption(
         "gateware",
         "your own FPGA design in place of the shipped one: Verilog files, a folder, a file list "
-        "(*.f), or an Amaranth class (docs/own-gateware.md)",
+        "(*.f), or an Amaranth class (docs/how-to/own-gateware.md)",
         default="",
         metavar="FILE[:TOP]|MODULE:CLASS",
         unset="the shipped design",

@@ -93,7 +93,7 @@ DEVICE: "Device[CubeSenseBoard, CubeSense]" = Device(
             GATEWARE_OPTIONS[0],
             meaning=f"a shipped variant of the FPGAs ({', '.join(VARIANTS)}) as --set gateware, or "
             "your own design of the pair, or of one FPGA: sun=..., nadir=... "
-            "(docs/own-gateware.md)",
+            "(docs/how-to/own-gateware.md)",
             metavar="VARIANT|FILE[:TOP]|MODULE:CLASS",
             known=VARIANTS,
         ),

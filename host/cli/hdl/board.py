@@ -75,7 +75,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _add_build_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--top", metavar="TOP", help="a shipped design; a wrong name lists them")
-    parser.add_argument("--gateware", metavar="FILE", help="your own design (docs/own-gateware.md)")
+    parser.add_argument(
+        "--gateware", metavar="FILE", help="your own design (docs/how-to/own-gateware.md)"
+    )
     names = [device.name for device in devices() if device.has_fpga]
     parser.add_argument("--device", choices=names, help="the device whose pins it has")
     add_value(parser, "baud", whole(BAUD, "rate of the serial port", 1))

@@ -88,7 +88,7 @@ class CubeStarUpsetOptions(UpsetOptions):
         tuple(layout.value for layout in Layout),
     )
     gateware: str = text(
-        "", "your own FPGA design (docs/own-gateware.md)", metavar="FILE[:TOP]|MODULE:CLASS"
+        "", "your own FPGA design (docs/how-to/own-gateware.md)", metavar="FILE[:TOP]|MODULE:CLASS"
     )
     gateware_param: str = text("", "its parameters", metavar="NAME=VALUE,...")
 
