@@ -6,7 +6,8 @@
 module full_frame;
     parameter COLUMNS = 1024;
     parameter ROWS = 512;
-    parameter PAUSE = 1;  // least number of clocks between two rows
+    // Least number of clocks between two rows; from 8 on VSYNC falls and rises apart from HSYNC.
+    parameter PAUSE = 1;
     parameter HIGH_WRITES = 0;  // a write pulse may begin while PIXCLK is high
     localparam PIXELS = COLUMNS * ROWS;
     localparam COLUMN_BITS = $clog2(COLUMNS);
@@ -43,7 +44,7 @@ module full_frame;
     endfunction
 
     // Camera: free-running, joined in the last rows of frame 0. One clock in 256 is stretched.
-    integer seed, half, frame, row, column, blank, stretch;
+    integer seed, half, frame, row, column, blank, paused, stretch;
     initial begin
         if (!$value$plusargs("seed=%d", seed)) seed = 1;
         half = 30000 + $unsigned($random(seed)) % 40000;
@@ -51,13 +52,15 @@ module full_frame;
         row = ROWS - 96 + $unsigned($random(seed)) % 64;
         column = $unsigned($random(seed)) % COLUMNS;
         blank = 0;
+        paused = 0;
         forever begin
             stretch = $random(seed);
             #(half + (stretch[7:0] == 0 ? stretch[19:8] * 100 : 0)) PIXCLK = 1;
             #(half / 4) if (blank > 0) begin
                 blank = blank - 1;
                 HSYNC = 0;
-                VSYNC = row != 0;
+                VSYNC = row != 0 || (PAUSE >= 8 && (paused < 3 || blank < 2));
+                paused = paused + 1;
                 PIXDATA = stretch[31:24];
             end else begin
                 HSYNC = 1;
@@ -66,6 +69,7 @@ module full_frame;
                 column = column + 1;
                 if (column == COLUMNS) begin
                     column = 0;
+                    paused = 0;
                     blank = PAUSE + $unsigned($random(seed)) % 20;
                     row = row + 1;
                     if (row == ROWS) begin
