@@ -3,6 +3,7 @@
 import argparse
 from collections import defaultdict
 from collections.abc import Callable
+from difflib import get_close_matches
 from importlib.metadata import metadata
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar
@@ -26,6 +27,23 @@ class Parser(argparse.ArgumentParser):
 
     def __init__(self, **options: Any) -> None:
         super().__init__(formatter_class=_Formatter, **options)
+        self.set_defaults(own_parser=self)
+
+    def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """The arguments; unknown ones are an error of the command that they belong to.
+
+        ``others``, a default of that command, has flags of other devices with these devices' names.
+        """
+        parsed, unknown = self.parse_known_args(args, namespace)
+        if unknown:
+            command, flag = parsed.own_parser, unknown[0].partition("=")[0]
+            if owners := getattr(parsed, "others", {}).get(flag):
+                command.error(f"{flag} is an option of {', '.join(owners)}, not of this device")
+            known = [flag for action in command._actions for flag in action.option_strings]
+            close = get_close_matches(flag, known, 1)
+            hint = f"; did you mean {close[0]}?" if close else ""
+            command.error(f"unknown argument {' '.join(unknown)}{hint}")
+        return parsed
 
     def format_help(self) -> str:
         """The help, with the address of the documents if it names one: they aren't installed."""

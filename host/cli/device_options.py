@@ -90,6 +90,17 @@ class _Joined(argparse.Action):
         setattr(args, self.dest, value if before is None else f"{before},{value}")
 
 
+def options_of_others(device: AnyDevice) -> dict[str, list[str]]:
+    """Flags of boards that ``device`` does not have, and the names of the devices that do."""
+    own = {option.name for option in device.all_options}
+    found: dict[str, list[str]] = {}
+    for other in devices():
+        for option in other.all_options:
+            if option.name not in own:
+                found.setdefault(option.flag, []).append(other.name)
+    return found
+
+
 def given_options(args: argparse.Namespace) -> dict[str, Any]:
     """The board options that were given, whichever device has them."""
     names = dict.fromkeys(option.name for device in devices() for option in device.all_options)

@@ -27,6 +27,7 @@ from cubestack.host.cli.device_options import (
     add_insight_arguments,
     add_option,
     insight,
+    options_of_others,
     show_notices,
 )
 from cubestack.host.cli.program import exit_status, read_console
@@ -74,7 +75,7 @@ def add_devices(
         add_flag(command, "--json", "print one JSON object per result and nothing else")
         add_options(command, experiment.options)
         add_board(command, (device, experiment))
-        command.set_defaults(chosen=(device, experiment))
+        command.set_defaults(chosen=(device, experiment), others=options_of_others(device))
         parsers.append(command)
     return parsers
 

@@ -1,4 +1,7 @@
 import json
+from pathlib import Path
+
+import pytest
 
 from cubestack.hdl.cubesense import tops as cubesense
 from cubestack.hdl.cubestar import tops as cubestar
@@ -21,3 +24,14 @@ def test_area_as_json(run: Run) -> None:
     for name, entry in counted.items():
         assert entry == {key: recorded[name][key] for key in entry}
         assert "ice40" not in entry
+
+
+def test_area_of_a_users_design_is_that_of_the_shipped_one_it_equals(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "same.py").write_text("from cubestack.hdl.cubestar.top import CubeStarTop as Same")
+    monkeypatch.chdir(tmp_path)
+    outcome = run("hdl", "area", "--json", "same:Same", "--device", "cubestar")
+    (found,) = json.loads(outcome.out)["designs"].values()
+    shipped = recorded_areas(cubestar.AREA_FILE)["cubestar"]
+    assert found == {key: shipped[key] for key in found}
