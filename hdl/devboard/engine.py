@@ -315,7 +315,7 @@ class _States:
                     m.next = "SAMPLE"
         with m.State("PUT"):
             m.d.comb += pins.apply.eq(1)
-            m.next = "EDGE"
+            m.next = "SETTLE"
         with m.State("EDGE"):
             m.d.comb += [pins.stage_clock.eq(1), pins.aim.eq(self.rising)]
             m.d.sync += self.followed.eq(0)
@@ -327,6 +327,10 @@ class _States:
             m.d.comb += pins.apply.eq(1)
             m.d.sync += self.settling.eq(self.settle)
             m.next = "SETTLE"
+            # The camera's lines move after its clock has fallen.
+            camera = self._is(Code.RUN, Code.STORE)
+            with m.If(camera & ~self.rising & ~self.followed):
+                m.next = "SAMPLE"
         with m.State("SETTLE"):
             m.d.sync += self.settling.eq(self.settling - 1)
             with m.If(self.settling == 0):
@@ -366,9 +370,7 @@ class _States:
                 m.next = "CLOCK"
             with m.If(clocked & self.rising):
                 m.d.sync += self.rising.eq(0)
-                m.next = "SAMPLE"
-                with m.If(self._is(Code.READ)):
-                    m.next = "EDGE"
+                m.next = "EDGE"
             with m.If(self.stopped):
                 m.next = "FINISH"
 

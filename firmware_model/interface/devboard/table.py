@@ -132,8 +132,8 @@ class Operation:
 _CAMERA = Parameter("camera", 1, "number of the camera whose clock runs")
 _MEMORY = Parameter("memory", 1, "number of the memory whose address and data are predicted")
 
-#: Each clock of RUN and STORE is: the camera's clock pin rises, outputs are taken; the next sample
-#: is put on its data and line pins; the clock pin falls, outputs are taken. After each edge every
+#: Each clock of RUN and STORE is: the camera's clock pin rises, outputs are taken; the clock pin
+#: falls; the next sample is put on its data and line pins, outputs are taken. After each edge every
 #: memory's data input follows its data output while that is driven, else it is 0. The clock pin
 #: must be low before, and no memory may be reading. Both end with ACKNOWLEDGE after an edge that
 #: changed an acknowledge, and with READS after an edge at which a memory reads (CE_N and OE_N low,

@@ -189,7 +189,8 @@ class DevboardModel:
                     predicted = self._known.predict_store(memory, level)
                     self._set(self._put(self._levels, **{ports.clock: 1}))
                 else:
-                    sample = {ports.data: pixel, ports.line: line & 1, ports.clock: 0}
+                    self._set(self._put(self._levels, **{ports.clock: 0}))
+                    sample = {ports.data: pixel, ports.line: line & 1}
                     self._set(self._put(self._levels, **sample))
                 acknowledged = self._acknowledged(self._known.now)
                 self._follow_bus()
