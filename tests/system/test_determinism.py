@@ -139,7 +139,8 @@ def test_exported_verilog_does_not_change_the_run(file: str, seed: int, exported
     A user's design may need pixels after ACK, so more frames are rendered, which the log shows.
     """
     shipped, given = (
-        life(seed, layouts="1", gateware=design, without="register-") for design in ("", exported)
+        life(seed, layouts="1", gateware=design, without="register-")
+        for design in ("", str(exported / file))
     )
     for one in (shipped, given):
         one["recording"] = str(one["recording"]).splitlines()[1:]
