@@ -74,7 +74,7 @@ def test_seed_and_profile_come_from_marker_or_command_line(run: Run) -> None:
 
 TAKES = (
     f"marker cubestack takes {', '.join(KEYS)}, layout, firmware, firmware_base, semihosting, "
-    "semihosting_root, profile, set"
+    "semihosting_root, gateware, gateware_param, profile, set"
 )
 WRONG_MARKERS = {
     "(3)": TAKES,

@@ -145,6 +145,7 @@ def test_every_exclusion_matches_a_documented_command() -> None:
     assert len(runnable()) > 30
 
 
+@pytest.mark.filterwarnings("default::cubestack.emulator.boards.gateware.GatewareNotice")
 @pytest.mark.parametrize(("document", "line"), runnable())
 def test_documented_commands_run(document: str, line: str, folder: Path, run: Run) -> None:
     words = shlex.split(line)
