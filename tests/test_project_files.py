@@ -85,7 +85,7 @@ def test_documented_ci_measurement_succeeds(run: Any) -> None:
         for name, workflow in workflows()
         if name.startswith("docs/")
         for one in commands(workflow)
-        if one.startswith("cubestack measure")
+        if one.startswith("cubestack measure") and "--gateware" not in one
     }
     assert run(*words.split()).code == 0
 
