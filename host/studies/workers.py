@@ -17,7 +17,9 @@ from contextlib import contextmanager
 from importlib import import_module
 from itertools import chain
 from multiprocessing import connection, get_context, parent_process
+from pathlib import Path
 from threading import Thread
+from traceback import extract_tb
 from typing import Any, TypeVar
 
 from cubestack.host.errors import install_command
@@ -100,11 +102,24 @@ def _handed_out(
             if not running:
                 return
             for future in wait(running, return_when=FIRST_COMPLETED).done:
-                result = future.result()  # before it is taken out: a lost one begins anew
+                result = _result(future)  # before it is taken out: a lost one begins anew
                 yield running.pop(future), result
     finally:
         for future in running:
             future.cancel()
+
+
+def _result(future: Future[Done]) -> Done:
+    """What the job returned or raised; CancelledError if its worker went away with it.
+
+    Dask raises a TypeError of its own for a result that is lost while it is being fetched.
+    """
+    try:
+        return future.result()
+    except TypeError as error:
+        if Path(extract_tb(error.__traceback__)[-1].filename).name == "cfexecutor.py":
+            raise CancelledError from None
+        raise
 
 
 @contextmanager

@@ -1,12 +1,14 @@
 import os
 import signal
 from collections.abc import Iterator
+from concurrent.futures import CancelledError, Future
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from cubestack.host.studies import workers
 from cubestack.host.studies.workers import AHEAD, WorkersError, performed
 
 
@@ -101,6 +103,19 @@ def test_missing_scheduler_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("cubestack.host.studies.workers.CONNECT", "100ms")
     with pytest.raises(WorkersError, match=r"no Dask scheduler answers at tcp://127\.0\.0\.1:1"):
         list(performed(square, range(2), 1, "tcp://127.0.0.1:1"))
+
+
+@pytest.mark.parametrize(
+    ("file", "raised"), [("distributed/cfexecutor.py", CancelledError), ("job.py", TypeError)]
+)
+def test_type_error_of_dask_means_that_a_result_is_lost(file: str, raised: type[Exception]) -> None:
+    failed = Future[int]()
+    try:
+        exec(compile("one, other = 9", file, "exec"))
+    except TypeError as error:
+        failed.set_exception(error)
+    with pytest.raises(raised):
+        workers._result(failed)
 
 
 def test_lost_scheduler_is_reported() -> None:
