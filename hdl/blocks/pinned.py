@@ -1,5 +1,6 @@
 """Components whose ports are the pins of a board, and the clocks that an engine may run at once."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -63,12 +64,12 @@ class PinnedComponent(Component):
         return ()
 
 
-class RtlilComponent(PinnedComponent):
+class RtlilComponent(PinnedComponent, ABC):
     """A component whose RTLIL is not made by Amaranth, or not of this very object."""
 
+    @abstractmethod
     def rtlil(self, name: str) -> str:
         """RTLIL with the top module ``name``, the same on every machine."""
-        raise NotImplementedError
 
 
 def connect_ports(

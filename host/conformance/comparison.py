@@ -89,7 +89,7 @@ def _unequal(here: Sequence[str], there: Sequence[str]) -> tuple[str, str]:
 
 
 def table(differences: Sequence[Difference], here: str, there: str) -> list[str]:
-    """Lines of text: the differences under the names of their kinds, or that there are none."""
+    """Lines of text: each kind's name with its differences; one line if nothing differs."""
     if not differences:
         return [f"{here} and {there} do not differ"]
     lines = [f"{len(differences)} differences between {here} (<) and {there} (>)"]

@@ -11,6 +11,7 @@ from cubestack.firmware_model.interface.devboard.address import PREFIX, parse_ad
 from cubestack.firmware_model.values import whole
 from cubestack.host.cli.arguments import add_flag, add_path, add_value
 from cubestack.host.cli.device_options import add_board_arguments, chosen_options
+from cubestack.host.cli.hdl.design import fpga_wiring
 from cubestack.host.devices.registry import device as registered
 from cubestack.host.devices.registry import devices
 from cubestack.host.terminal import busy, progress, say, show, tell
@@ -59,12 +60,7 @@ def run(args: argparse.Namespace) -> int:
     device = registered(args.device)
     options = chosen_options(args, device)
     address = parse_address(PREFIX + args.port.removeprefix(PREFIX))
-    board = device.open_board(device.default_scene(), seed=0, engine="auto", **options)
-    try:
-        assert board.engine is not None
-        wiring = board.engine.wiring
-    finally:
-        board.close()
+    wiring = fpga_wiring(device, options)
     opened: list[DevboardEngine] = []
 
     def open_one() -> DevboardEngine:

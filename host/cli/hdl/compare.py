@@ -12,6 +12,7 @@ from rich.table import Table
 from cubestack.firmware_model.values import number, whole
 from cubestack.host.cli.arguments import add_flag, add_path, add_value
 from cubestack.host.cli.device_options import add_board_arguments, chosen_options
+from cubestack.host.cli.hdl.design import fpga_wiring
 from cubestack.host.devices.registry import device as registered
 from cubestack.host.devices.registry import devices
 from cubestack.host.terminal import busy, say, show, tell
@@ -85,12 +86,7 @@ def run(args: argparse.Namespace) -> int:
         raise ValueError("--hold needs PIN=LEVEL with a hexadecimal level: --hold BANK=0") from None
     with busy(f"reading {args.file}"):
         capture = read_capture(args.file)
-    board = device.open_board(device.default_scene(), seed=0, engine="auto", **options)
-    try:
-        assert board.engine is not None
-        wiring = board.engine.wiring
-    finally:
-        board.close()
+    wiring = fpga_wiring(device, options)
     with busy("replaying"):
         compared = compare_capture(
             capture,

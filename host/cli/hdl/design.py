@@ -1,10 +1,16 @@
-"""Options of the actions that check a design against a device's contract."""
+"""Designs of a device's FPGA: options of the actions that check one, and its wiring."""
 
 import argparse
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 from cubestack.hdl.contract.contract import Contract
 from cubestack.hdl.contract.design import Design
+from cubestack.host.devices.device import AnyDevice
 from cubestack.host.devices.registry import device, devices
+
+if TYPE_CHECKING:
+    from cubestack.emulator.rtl.wiring import Wiring
 
 FILE = "design.v[:TOP], files with commas, a folder, a list of files, or MODULE:CLASS"
 
@@ -25,6 +31,16 @@ def design_of(args: argparse.Namespace, text: str, image: str = "") -> Design:
     """The design that is checked; ValueError for a device without a contract."""
     parameters = dict(map(_parameter, args.gateware_param))
     return Design(_contract(args.device), text, parameters, image=image)
+
+
+def fpga_wiring(chosen: AnyDevice, options: Mapping[str, Any]) -> "Wiring":
+    """The FPGA of a device with these options of its board, and its surroundings."""
+    board = chosen.open_board(chosen.default_scene(), seed=0, engine="auto", **options)
+    try:
+        assert board.engine is not None
+        return board.engine.wiring
+    finally:
+        board.close()
 
 
 def _contract(name: str | None) -> Contract:
