@@ -5,7 +5,7 @@ import os
 import shutil
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
@@ -220,15 +220,14 @@ class _Bench:
                 waveform=waveform,
             )
             shown = 0
-            while True:
+            over = False
+            while not over:
+                over = bool(wait([future], timeout=LOOK_S).done)
                 names = noted.read_text(encoding="utf-8").split()
                 for number, name in enumerate(names[shown:], shown):
                     told(name, number)
                 shown = len(names)
-                try:
-                    return future.result(timeout=LOOK_S)
-                except TimeoutError:
-                    continue
+            return future.result()
 
     def _parameters(self, size: Size) -> dict[str, str]:
         """All that a design of this size is made with, for the tests."""

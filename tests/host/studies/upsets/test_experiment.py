@@ -105,7 +105,7 @@ class VotedCounter(MatrixCounter):
 
 @pytest.fixture
 def voted(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    kept = stack._wiring, experiment._registers
+    kept = stack._wiring, cubestar._wiring, experiment._registers
     monkeypatch.setattr(frames, "MatrixCounter", VotedCounter)
     for cached in kept:
         cached.cache_clear()
