@@ -249,7 +249,12 @@ class Machine:
         return int(self._library.iss_pin_level(self.handle, port, bit))
 
     def uart_receive(self, unit: int, data: int, flags: int = 0) -> None:
-        """Deliver a complete character; ``flags``: 1 framing error, 2 parity error."""
+        """Deliver a complete character to a serial block.
+
+        ``unit``: index of ``SERIAL_UNITS``, or 0x100 | RX pin (16 * port + bit) for the blocks that
+        receive at this pin. ``flags``: 1 framing error, 2 parity error; from bit 8 the line's bits
+        per second. A sent character is a message ``UART`` whose unit is block | TX pin << 8.
+        """
         self._library.iss_uart_receive(self.handle, unit, data, flags)
 
     def i2c_slave_start(self, unit: int, address_byte: int) -> int | None:

@@ -78,3 +78,11 @@ ROUTES: dict[str, tuple[int, ...]] = {
     signal: tuple(map(pin_number, pins))
     for signal, *pins in (line.split() for line in _TABLE.split("\n") if line.strip())
 }
+
+#: Serial blocks in the order of their unit numbers in messages and calls of the simulator.
+SERIAL_UNITS = ("USART0", "USART1", "USART2", "UART0", "UART1", "LEUART0", "LEUART1")
+
+
+def serial_locations(unit: str) -> tuple[tuple[int, int], ...]:
+    """The pairs of TX and RX pin of a block of ``SERIAL_UNITS``, location 0 first."""
+    return tuple(zip(ROUTES[f"{unit}_TX"], ROUTES[f"{unit}_RX"], strict=True))

@@ -10,7 +10,8 @@ namespace efm32gg {
 
 enum class Kind : int32_t {
     PIN,          // unit: port * 16 + bit; value: level 0 or 1, -1: released; extra: drive
-    UART,         // a character begins; unit; value: its bits; extra: its duration in ps
+    UART,         // a character begins; unit: block and TX pin; value: its bits, 0x10000 for a
+                  // break; extra: its duration in ps. See Part::uart_receive
     I2C_START,    // master; unit; value: address byte
     I2C_WRITE,    // master; value: byte
     I2C_READ,     // master requests a byte; extra: 1 if it acknowledged the previous one

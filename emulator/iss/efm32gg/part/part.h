@@ -158,6 +158,10 @@ public:
     void answer_call(uint32_t result);
     void analog_changed();
     double volts(int input) const { return memories.analog ? memories.analog[input] : 0; }
+    // Serial bytes, for all blocks alike. Out: message UART with unit = block | pin << 8, where block
+    // is an index of SERIAL_UNITS (interface/efm32gg/pins.py) and pin (port * 16 + bit) the TX pin
+    // that ROUTE selects; none without a route to a pin that drives. In: here, once a character is
+    // complete; `unit` is a block, or 0x100 | RX pin for the blocks that receive there.
     // `flags`: bit 0 framing error, bit 1 parity error; from bit 8 the line's bit rate, 0: unknown.
     void uart_receive(int unit, uint32_t data, uint32_t flags);
     // The I2C unit by number or by the pin of its SDA; null if none is routed there.
