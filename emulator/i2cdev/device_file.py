@@ -1,6 +1,6 @@
 """An opened /dev/i2c-N: handles a program's calls as Linux's i2c-dev.
 
-Calls are packed requests (see ``firmware_model/formats/linux_i2c.py``); each returns a packed
+Calls are packed requests (see ``firmware_model/formats/i2c_socket.py``); each returns a packed
 reply, at once or when its transfer ends in virtual time.
 """
 
@@ -13,8 +13,10 @@ from cubestack.emulator.bus.i2c import I2cMessage
 from cubestack.emulator.i2cdev.adapter import FUNCTIONS, I2cAdapter
 from cubestack.emulator.i2cdev.smbus import Transaction
 from cubestack.emulator.sim.virtual_time import PS_PER_MS
+from cubestack.firmware_model.formats import i2c_socket
 from cubestack.firmware_model.formats import linux_i2c as linux
-from cubestack.firmware_model.formats.linux_i2c import Call, Ioctl, MessageFlag, SmbusSize
+from cubestack.firmware_model.formats.i2c_socket import Call
+from cubestack.firmware_model.formats.linux_i2c import Ioctl, MessageFlag, SmbusSize
 
 Reply = Callable[[bytes], None]
 
@@ -53,20 +55,20 @@ class DeviceFile:
         try:
             match call:
                 case Call.OPEN:
-                    self.mode = linux.unpack_open(body) & MODE_FLAGS
-                    done(linux.reply(0))
+                    self.mode = i2c_socket.unpack_open(body) & MODE_FLAGS
+                    done(i2c_socket.reply(0))
                 case Call.MODE:
-                    done(linux.reply(self.mode))
+                    done(i2c_socket.reply(self.mode))
                 case _ if not self._allows(call):
                     raise OSError(errno.EBADF, f"the file's mode does not allow {call.name}")
                 case Call.IOCTL:
-                    done(self._ioctl(*linux.unpack_ioctl(body)))
+                    done(self._ioctl(*i2c_socket.unpack_ioctl(body)))
                 case Call.RDWR:
-                    self._rdwr(linux.unpack_rdwr(body), done)
+                    self._rdwr(i2c_socket.unpack_rdwr(body), done)
                 case Call.SMBUS:
-                    self._smbus(linux.unpack_smbus(body), done)
+                    self._smbus(i2c_socket.unpack_smbus(body), done)
                 case Call.READ:
-                    self._read(linux.unpack_read(body), done)
+                    self._read(i2c_socket.unpack_read(body), done)
                 case Call.WRITE:
                     self._write(body, done)
         except OSError as error:
@@ -89,23 +91,23 @@ class DeviceFile:
         match number:
             case Ioctl.SLAVE | Ioctl.SLAVE_FORCE:
                 if argument > (_LAST_10_BIT if self.ten_bit else _LAST_7_BIT):
-                    return linux.reply(-errno.EINVAL)
+                    return i2c_socket.reply(-errno.EINVAL)
                 self.address = argument
             case Ioctl.TENBIT:
                 self.ten_bit = bool(argument)
             case Ioctl.PEC:
                 self.checksums = bool(argument)
             case Ioctl.FUNCS:
-                return linux.reply(0, _U64.pack(FUNCTIONS))
+                return i2c_socket.reply(0, _U64.pack(FUNCTIONS))
             case Ioctl.RETRIES | Ioctl.TIMEOUT if argument > _INT_MAX:
-                return linux.reply(-errno.EINVAL)
+                return i2c_socket.reply(-errno.EINVAL)
             case Ioctl.RETRIES:
                 self._adapter.retries = argument
             case Ioctl.TIMEOUT:
                 self._adapter.timeout_ps = argument * TIMEOUT_UNIT_PS
             case _:
-                return linux.reply(-errno.ENOTTY)
-        return linux.reply(0)
+                return i2c_socket.reply(-errno.ENOTTY)
+        return i2c_socket.reply(0)
 
     def _rdwr(self, wanted: list[linux.RdwrMessage], done: Reply) -> None:
         if not 1 <= len(wanted) <= linux.MAX_MESSAGES:
@@ -113,7 +115,7 @@ class DeviceFile:
         messages = [_plain(message) for message in wanted]
 
         def answer() -> bytes:
-            return linux.reply(len(messages), b"".join(m.data for m in messages if m.reading))
+            return i2c_socket.reply(len(messages), b"".join(m.data for m in messages if m.reading))
 
         self._transfer(messages, answer, done)
 
@@ -128,7 +130,7 @@ class DeviceFile:
 
         def answer() -> bytes:
             data = transaction.answer()[: linux.smbus_data_bytes(call.size)]
-            return linux.reply(0, data if transaction.answers else b"")
+            return i2c_socket.reply(0, data if transaction.answers else b"")
 
         self._transfer(transaction.messages, answer, done)
 
@@ -136,19 +138,19 @@ class DeviceFile:
         self._check_address()
         count = min(count, linux.MAX_MESSAGE_BYTES)
         message = I2cMessage(self.address, read=count, probe_read=not count)
-        self._transfer([message], lambda: linux.reply(count, bytes(message.data)), done)
+        self._transfer([message], lambda: i2c_socket.reply(count, bytes(message.data)), done)
 
     def _write(self, data: bytes, done: Reply) -> None:
         self._check_address()
         message = I2cMessage(self.address, bytearray(data[: linux.MAX_MESSAGE_BYTES]))
-        self._transfer([message], lambda: linux.reply(len(message.data)), done)
+        self._transfer([message], lambda: i2c_socket.reply(len(message.data)), done)
 
     def _transfer(
         self, messages: list[I2cMessage], answer: Callable[[], bytes], done: Reply
     ) -> None:
         def end(result: int) -> None:
             try:
-                packed = linux.reply(result) if result < 0 else answer()
+                packed = i2c_socket.reply(result) if result < 0 else answer()
             except OSError as error:
                 packed = _failed(error)
             done(packed)
@@ -161,7 +163,7 @@ class DeviceFile:
 
 
 def _failed(error: OSError) -> bytes:
-    return linux.reply(-(error.errno or errno.EIO))
+    return i2c_socket.reply(-(error.errno or errno.EIO))
 
 
 def _plain(message: linux.RdwrMessage) -> I2cMessage:

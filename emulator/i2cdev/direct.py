@@ -12,7 +12,7 @@ from cubestack.emulator.bus.i2c import I2cBus, I2cMessage
 from cubestack.emulator.i2cdev.adapter import I2cAdapter
 from cubestack.emulator.i2cdev.device_file import DeviceFile
 from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
-from cubestack.firmware_model.formats.linux_i2c import Call, split_reply
+from cubestack.firmware_model.formats.i2c_socket import Call, split_reply
 
 I2C_M_RD = 0x0001
 """Flag of a reading message in linux/i2c.h, the only one that is supported."""
@@ -40,7 +40,7 @@ class DirectI2c:
                     message.buf[index] = bytes([byte])
 
     def call(self, call: Call, body: bytes) -> tuple[int, bytes]:
-        """Perform a packed call of the device file (``firmware_model/formats/linux_i2c.py``).
+        """Perform a packed call of the device file (``firmware_model/formats/i2c_socket.py``).
 
         Returns the result, 0 or more or a negative errno, and data.
         """

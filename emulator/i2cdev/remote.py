@@ -1,5 +1,6 @@
 """The bus of an emulation in another process, reached through its socket."""
 
+import contextlib
 import errno
 import os
 import select
@@ -10,17 +11,24 @@ from functools import partial
 from pathlib import Path
 
 from cubestack.emulator.ports.endpoint import Endpoint, PortError
-from cubestack.firmware_model.formats.linux_i2c import (
-    LENGTH,
+from cubestack.firmware_model.formats.i2c_socket import (
     Call,
+    pack_hello,
     pack_open,
+    packet,
     reply,
     request,
+    split_reply,
     take_packet,
+    unpack_targets,
 )
 
 CHUNK_BYTES = 1 << 16
+PATIENCE_S = 10.0
+"""Wall time in which an emulation must answer a greeting; one that is paused does not."""
+
 Done = Callable[[bytes], None]
+HELLO = request(0, Call.HELLO, pack_hello())
 
 
 class RemoteBus(Endpoint):
@@ -33,6 +41,29 @@ class RemoteBus(Endpoint):
         self._poller = select.epoll()
         self._connect().close()
 
+    def greet(self) -> list[tuple[str, int]]:
+        """Name and address of each device, from the emulation; waits for it.
+
+        Raises PortError if it refuses this version of the protocol, or does not answer in time.
+        """
+        with contextlib.closing(self._connect()) as link:
+            link.settimeout(PATIENCE_S)
+            received = bytearray()
+            try:
+                link.sendall(packet(HELLO))
+                while (answer := take_packet(received)) is None:
+                    data = link.recv(CHUNK_BYTES)
+                    if not data:
+                        raise PortError(f"the emulation at {self.name} has ended")
+                    received += data
+            except TimeoutError:
+                raise PortError(f"{self.name} does not answer; is that emulation paused?") from None
+        result, data = split_reply(answer)
+        if result < 0:
+            reason = data.decode(errors="replace") or os.strerror(-result)
+            raise PortError(f"{self.name} refuses: {reason}")
+        return unpack_targets(data)
+
     def open(self, flags: int = os.O_RDWR) -> "_RemoteFile":
         """Open a device file with flags of open(2); raises PortError."""
         link = self._connect()
@@ -40,6 +71,7 @@ class RemoteBus(Endpoint):
         self._poller.register(fileno, select.EPOLLIN)
         file = _RemoteFile(link, partial(self._poller.modify, fileno), partial(self._drop, fileno))
         self._files[fileno] = file
+        file.perform(Call.HELLO, pack_hello(), lambda _reply: None)
         file.perform(Call.OPEN, pack_open(flags), lambda _reply: None)
         return file
 
@@ -95,9 +127,8 @@ class _RemoteFile:
         if self.gone:
             done(reply(-errno.EIO))
             return
-        data = request(0, call, body)
         self._due.append(done)
-        self._unsent += LENGTH.pack(len(data)) + data
+        self._unsent += packet(request(0, call, body))
         self._send()
 
     def close(self) -> None:

@@ -21,7 +21,7 @@ from cubestack.emulator.i2cdev.remote import RemoteBus
 from cubestack.emulator.i2cdev.scheduler import TURNAROUND_NS, open_scheduler
 from cubestack.emulator.i2cdev.seccomp.supervisor import Files, Supervisor
 from cubestack.emulator.i2cdev.server import I2cServer
-from cubestack.emulator.ports.endpoint import Endpoint
+from cubestack.emulator.ports.endpoint import Endpoint, PortError
 from cubestack.emulator.sim.virtual_time import Kernel
 
 IDLE_NS = 100_000_000
@@ -39,20 +39,31 @@ class HostBus:
     port: Endpoint  # the port that a scheduler must serve
     files: Files  # opens a device file of the bus
     path: str  # path of its socket
+    targets: Sequence[tuple[str, int]]  # name and address of each device
 
 
 def emulated_bus(
-    kernel: Kernel, busy: Callable[[], bool], adapter: I2cAdapter, path: Path
+    kernel: Kernel,
+    busy: Callable[[], bool],
+    adapter: I2cAdapter,
+    path: Path,
+    targets: Sequence[tuple[str, int]] = (),
 ) -> HostBus:
     """The bus of an emulation in this process; also serves it at ``path``. Raises PortError."""
-    server = I2cServer(path, adapter)
-    return HostBus(kernel, busy, adapter, server, partial(DeviceFile, adapter), server.name)
+    server = I2cServer(path, adapter, targets)
+    files = partial(DeviceFile, adapter)
+    return HostBus(kernel, busy, adapter, server, files, server.name, targets)
 
 
 def attached_bus(path: Path) -> HostBus:
     """The bus that another process serves at ``path``; raises PortError."""
     remote = RemoteBus(path)
-    return HostBus(Kernel(), lambda: False, None, remote, remote.open, remote.name)
+    try:
+        targets = remote.greet()
+    except PortError:
+        remote.close()
+        raise
+    return HostBus(Kernel(), lambda: False, None, remote, remote.open, remote.name, targets)
 
 
 def run_program(

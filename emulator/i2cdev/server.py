@@ -2,8 +2,9 @@
 
 A client's calls run one after the other, in virtual time; transfers of several clients queue for
 the wire. Calls that a client sends too early wait in the operating system. A new client for which
-this process has no descriptor left gets ENFILE. A client that sends malformed calls is
-disconnected. If a client disconnects during its transfer, the transfer completes.
+this process has no descriptor left gets ENFILE. A client that begins without HELLO, speaks another
+version or sends a malformed call gets EPROTO with the reason in words, and is disconnected. If a
+client disconnects during its transfer, the transfer completes.
 """
 
 import contextlib
@@ -12,7 +13,7 @@ import os
 import select
 import socket
 import stat
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -20,7 +21,7 @@ from cubestack.emulator.i2cdev.adapter import I2cAdapter
 from cubestack.emulator.i2cdev.descriptors import has_room
 from cubestack.emulator.i2cdev.device_file import DeviceFile
 from cubestack.emulator.ports.endpoint import Endpoint, PortError
-from cubestack.firmware_model.formats import linux_i2c as linux
+from cubestack.firmware_model.formats import i2c_socket
 
 CHUNK_BYTES = 1 << 16
 HUNG_UP = select.EPOLLHUP | select.EPOLLERR
@@ -29,14 +30,18 @@ HUNG_UP = select.EPOLLHUP | select.EPOLLERR
 class I2cServer(Endpoint):
     """All connections, as one port of a scheduler; ``name`` is the path of the socket."""
 
-    def __init__(self, path: Path, adapter: I2cAdapter) -> None:
+    def __init__(
+        self, path: Path, adapter: I2cAdapter, targets: Sequence[tuple[str, int]] = ()
+    ) -> None:
         """Listen at ``path``; creates its folder, accessible to this user only.
 
-        Raises PortError if ``path`` is in use, or the folder is accessible to others.
+        ``targets``: name and address of each device, for clients. Raises PortError if
+        ``path`` is in use, or the folder is accessible to others.
         """
         path = path.absolute()
         self.name = str(path)
         self._adapter = adapter
+        self._greeting = i2c_socket.reply(i2c_socket.VERSION, i2c_socket.pack_targets(targets))
         self._clients: dict[int, _Client] = {}
         self._files: dict[int, DeviceFile] = {}
         _make_private(path.parent)
@@ -80,7 +85,11 @@ class I2cServer(Endpoint):
             return
         self._poller.register(fileno, select.EPOLLIN)
         self._clients[fileno] = _Client(
-            connection, self._adapter, self._files, partial(self._poller.modify, fileno)
+            connection,
+            self._adapter,
+            self._greeting,
+            self._files,
+            partial(self._poller.modify, fileno),
         )
 
     def _drop(self, fileno: int) -> None:
@@ -104,12 +113,15 @@ class _Client:
         self,
         connection: socket.socket,
         adapter: I2cAdapter,
+        greeting: bytes,
         files: dict[int, DeviceFile],
         watch: Callable[[int], None],
     ) -> None:
-        """``watch`` changes the events that are polled for ``connection``."""
+        """``greeting`` answers HELLO; ``watch`` changes the polled events of ``connection``."""
         self._socket = connection
         self._socket.setblocking(False)
+        self._greeting = greeting
+        self._greeted = False
         self._files = files
         self._file = DeviceFile(adapter)
         self._watch = watch
@@ -160,28 +172,44 @@ class _Client:
     def _take_call(self) -> bool:
         """Start the oldest complete call; returns whether there was one."""
         try:
-            data = linux.take_packet(self._received, linux.MAX_REQUEST_BYTES)
+            data = i2c_socket.take_packet(self._received, i2c_socket.MAX_REQUEST_BYTES)
             if data is None:
                 return False
             self._waiting = True
-            key, call, body = linux.split_request(data)
-            if call is linux.Call.OPEN:
-                self._key = key
-                self._files[key] = self._file
-                key = 0
-            file = self._files.get(key) if key else self._file
-            if file is None:
-                self._answer(linux.reply(-errno.EBADF))
-            else:
-                file.perform(call, body, self._answer)
-        except ValueError:
+            self._perform(*i2c_socket.split_request(data))
+        except ValueError as error:
+            self._answer(i2c_socket.reply(-errno.EPROTO, str(error).encode()))
             self.gone = True
         return True
+
+    def _perform(self, key: int, call: i2c_socket.Call, body: bytes) -> None:
+        """Perform a call; ValueError for one that the protocol does not allow."""
+        if call is i2c_socket.Call.HELLO:
+            self._greet(i2c_socket.unpack_hello(body))
+            return
+        if not self._greeted:
+            raise ValueError(f"a connection begins with HELLO, not with {call.name}")
+        if call is i2c_socket.Call.OPEN:
+            self._key = key
+            self._files[key] = self._file
+            key = 0
+        file = self._files.get(key) if key else self._file
+        if file is None:
+            self._answer(i2c_socket.reply(-errno.EBADF))
+        else:
+            file.perform(call, body, self._answer)
+
+    def _greet(self, version: int) -> None:
+        if version != i2c_socket.VERSION:
+            ours = i2c_socket.VERSION
+            raise ValueError(f"this emulation speaks version {ours} of the protocol, not {version}")
+        self._greeted = True
+        self._answer(self._greeting)
 
     def _answer(self, data: bytes) -> None:
         self._waiting = False
         if not self.gone:
-            self._send(linux.LENGTH.pack(len(data)) + data)
+            self._send(i2c_socket.packet(data))
             # The socket is writable, so if another call was received, exchange is called at once.
             more = self._unsent or self._received
             self._watch_for(select.EPOLLOUT if more else select.EPOLLIN)
@@ -203,9 +231,8 @@ class _Client:
 
 
 def _refuse(connection: socket.socket) -> None:
-    answer = linux.reply(-errno.ENFILE)
     with connection, contextlib.suppress(OSError):
-        connection.send(linux.LENGTH.pack(len(answer)) + answer)
+        connection.send(i2c_socket.packet(i2c_socket.reply(-errno.ENFILE)))
 
 
 def _make_private(folder: Path) -> None:

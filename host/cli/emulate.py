@@ -30,13 +30,14 @@ from cubestack.emulator.ports.control import ControlPort
 from cubestack.emulator.ports.endpoint import Lifeline
 from cubestack.emulator.ports.serial_port import SerialPort
 from cubestack.emulator.scene.orbit_file import load_orbit
-from cubestack.firmware_model.formats.linux_i2c import socket_path
+from cubestack.firmware_model.formats.i2c_socket import socket_path
 from cubestack.firmware_model.formats.setup import Setup
 from cubestack.firmware_model.values import whole
 from cubestack.host.cli import device_options
 from cubestack.host.cli.arguments import add_path, add_value
 from cubestack.host.cli.ports import LAST_PORT, add_port_arguments, check_linux, open_ports
 from cubestack.host.cli.program import exit_status, read_console
+from cubestack.host.devices.i2c_targets import i2c_targets
 from cubestack.host.devices.registry import device, device_names, devices
 from cubestack.host.emulation.emulated import AnyEmulated, power_up
 from cubestack.host.emulation.history import History
@@ -124,7 +125,8 @@ def run(args: argparse.Namespace) -> int:
         control = _control(args, opened, served, history, stack)
         i2c_ports = []
         if args.i2c is not None:
-            i2c_ports.append(I2cServer(socket_path(args.i2c), adapter))
+            targets = i2c_targets(one.device for one in opened)
+            i2c_ports.append(I2cServer(socket_path(args.i2c), adapter, targets))
             stack.callback(i2c_ports[0].close)
         scheduler = stack.enter_context(
             open_scheduler(

@@ -18,7 +18,7 @@ import argparse
 import errno
 import shutil
 import tempfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -32,12 +32,12 @@ from cubestack.emulator.i2cdev.running import (
     run_program,
 )
 from cubestack.emulator.sim.virtual_time import PS_PER_S
-from cubestack.firmware_model.formats.linux_i2c import socket_path
+from cubestack.firmware_model.formats.i2c_socket import socket_path
 from cubestack.firmware_model.values import whole
 from cubestack.host.cli import device_options
 from cubestack.host.cli.arguments import add_flag, add_path, add_value
 from cubestack.host.cli.ports import check_linux
-from cubestack.host.devices.device import AnyDevice
+from cubestack.host.devices.i2c_targets import i2c_targets
 from cubestack.host.devices.registry import device, device_names, devices
 from cubestack.host.emulation.emulated import AnyEmulated, open_device
 from cubestack.host.emulation.terminals import PORT, Terminals
@@ -123,6 +123,9 @@ def run(args: argparse.Namespace) -> int:
         else:
             bus = attached_bus(Path(args.attach) if args.attach else socket_path(args.bus))
             stack.callback(bus.port.close)
+        if not args.quiet:
+            found = ", ".join(f"{name} at {address:#04x}" for name, address in bus.targets)
+            say(f"I2C bus {args.bus}: {found}")
         try:
             return run_program(
                 args.program,
@@ -199,30 +202,17 @@ def _emulated(args: argparse.Namespace, stack: ExitStack) -> HostBus:
     def at_work() -> bool:
         return any(one.board.busy() for one in opened)
 
-    if not args.quiet:
-        say(f"I2C bus {args.bus}: {', '.join(_on_bus(opened, args.i2c_addr))}")
     adapter = I2cAdapter(kernel, bus, address_errno=int(getattr(errno, args.nack_errno)))
     folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="cubestack-"))
-    host_bus = emulated_bus(kernel, at_work, adapter, Path(folder) / f"i2c-{args.bus}")
+    targets = i2c_targets((one.device for one in opened), args.i2c_addr)
+    host_bus = emulated_bus(kernel, at_work, adapter, Path(folder) / f"i2c-{args.bus}", targets)
     stack.callback(host_bus.port.close)
     return host_bus
 
 
-def _on_bus(opened: Sequence[AnyEmulated], moves: Sequence[tuple[int, int]]) -> list[str]:
-    """What answers at which address."""
-    now = dict(moves)
-    found = _addresses(one.device for one in opened)
-    return [f"{name} at {now.get(address, address):#04x}" for name, address in found.items()]
-
-
-def _addresses(of: Iterable[AnyDevice] | None = None) -> dict[str, int]:
-    """What is where at first: each device's node, and its registers behind another address."""
-    found = {}
-    for one in devices() if of is None else of:
-        found[one.name] = one.interface.i2c_address
-        if one.interface.registers is not None:
-            found[f"{one.name}-registers"] = one.interface.registers.i2c_address
-    return found
+def _addresses() -> dict[str, int]:
+    """What is where at first, of all devices."""
+    return dict(i2c_targets(devices()))
 
 
 def _move(text: str) -> tuple[int, int]:

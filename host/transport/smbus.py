@@ -20,8 +20,10 @@ from typing import Any, Protocol
 from smbus2 import SMBus
 from smbus2.smbus2 import I2cFunc
 
+from cubestack.firmware_model.formats import i2c_socket
 from cubestack.firmware_model.formats import linux_i2c as linux
-from cubestack.firmware_model.formats.linux_i2c import Call, Ioctl, MessageFlag, SmbusSize
+from cubestack.firmware_model.formats.i2c_socket import Call
+from cubestack.firmware_model.formats.linux_i2c import Ioctl, MessageFlag, SmbusSize
 from cubestack.host.errors import PortClosedError, PortOpenError
 
 READ, WRITE = 1, 0
@@ -157,8 +159,8 @@ class CubeSMBus(SMBus):
     def i2c_rdwr(self, *i2c_msgs: Any) -> None:
         """One combined transfer of smbus2's ``i2c_msg``s, which receive the data read."""
         messages = [_plain(message) for message in i2c_msgs]
-        data = self._call(Call.RDWR, linux.pack_rdwr(messages))
-        for message, part in zip(i2c_msgs, linux.split_rdwr(messages, data), strict=True):
+        data = self._call(Call.RDWR, i2c_socket.pack_rdwr(messages))
+        for message, part in zip(i2c_msgs, i2c_socket.split_rdwr(messages, data), strict=True):
             for index, byte in enumerate(part):
                 message.buf[index] = bytes([byte])
             if message.flags & MessageFlag.RECEIVE_LENGTH:
@@ -178,7 +180,7 @@ class CubeSMBus(SMBus):
         self._set_address(address, force)
         filled = data.ljust(linux.SMBUS_DATA_BYTES, b"\0")
         call = linux.SmbusCall(direction, command & 0xFF, size, filled)
-        return self._call(Call.SMBUS, linux.pack_smbus(call))
+        return self._call(Call.SMBUS, i2c_socket.pack_smbus(call))
 
     def _set_address(self, address: int, force: bool | None = None) -> None:
         force = self.force if force is None else force
@@ -192,7 +194,9 @@ class CubeSMBus(SMBus):
         return I2cFunc(value)
 
     def _ioctl(self, number: Ioctl, argument: int) -> bytes:
-        return self._call(Call.IOCTL, linux.pack_ioctl(number, argument & 0xFFFF_FFFF_FFFF_FFFF))
+        return self._call(
+            Call.IOCTL, i2c_socket.pack_ioctl(number, argument & 0xFFFF_FFFF_FFFF_FFFF)
+        )
 
     def _call(self, call: Call, body: bytes) -> bytes:
         if self._link is None:
@@ -215,17 +219,25 @@ class _SocketLink:
             raise PortOpenError(
                 f"no emulation serves {path} ({error.strerror}); start one with cubestack emulate"
             ) from error
+        try:
+            result, words = self.call(Call.HELLO, i2c_socket.pack_hello())
+        except PortClosedError:
+            self.close()
+            raise
+        if result < 0:
+            self.close()
+            reason = words.decode(errors="replace") or os.strerror(-result)
+            raise PortOpenError(f"{path} refuses: {reason}")
 
     @property
     def fileno(self) -> int:
         return self._socket.fileno()
 
     def call(self, call: Call, body: bytes) -> tuple[int, bytes]:
-        data = linux.request(0, call, body)
         try:
-            self._socket.sendall(linux.LENGTH.pack(len(data)) + data)
-            (length,) = linux.LENGTH.unpack(self._receive(linux.LENGTH.size))
-            return linux.split_reply(self._receive(length))
+            self._socket.sendall(i2c_socket.packet(i2c_socket.request(0, call, body)))
+            (length,) = i2c_socket.LENGTH.unpack(self._receive(i2c_socket.LENGTH.size))
+            return i2c_socket.split_reply(self._receive(length))
         except OSError as error:
             raise PortClosedError("the emulation has ended") from error
 
@@ -250,7 +262,7 @@ def _find_socket(bus: int | str) -> Path:
     path = os.environ.get("CUBESTACK_I2C_SOCKET")
     if path and os.environ.get("CUBESTACK_I2C_BUS") == text:
         return Path(path)
-    return linux.socket_path(int(text))
+    return i2c_socket.socket_path(int(text))
 
 
 def _plain(message: Any) -> linux.RdwrMessage:

@@ -13,14 +13,15 @@ from pathlib import Path
 
 import pytest
 
-from cubestack.firmware_model.formats.linux_i2c import (
-    LENGTH,
+from cubestack.firmware_model.formats.i2c_socket import (
     Call,
-    RdwrMessage,
+    pack_hello,
     pack_rdwr,
+    packet,
     request,
     socket_path,
 )
+from cubestack.firmware_model.formats.linux_i2c import RdwrMessage
 from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
 from cubestack.host.clients.i2c import I2cClient
@@ -39,7 +40,7 @@ GROWTH_BYTES = 4 << 20
 
 IDENTIFY = encode_frame(b"\x80")
 RDWR = request(0, Call.RDWR, pack_rdwr([RdwrMessage(CUBESENSE.i2c_address, 1, 8)]))
-READ_BUS = LENGTH.pack(len(RDWR)) + RDWR
+READ_BUS = packet(request(0, Call.HELLO, pack_hello())) + packet(RDWR)
 
 
 def memory_bytes(process: subprocess.Popen[str]) -> int:

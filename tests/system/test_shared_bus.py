@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from cubestack.firmware_model.formats.linux_i2c import socket_path
+from cubestack.firmware_model.formats.i2c_socket import socket_path
 from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.host.devices.registry import device_names, devices
 from cubestack.host.targets import open_target

@@ -60,19 +60,6 @@ __attribute__((constructor)) static void prepare(void)
     pthread_atfork(hold, release, forget_channel);
 }
 
-static int connect_bus(void)
-{
-    struct sockaddr_un address = {.sun_family = AF_UNIX};
-    strcpy(address.sun_path, config.socket);
-    int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    if (fd >= 0 && connect(fd, (struct sockaddr *)&address, sizeof address)) {
-        close(fd);
-        errno = ENODEV;
-        return -1;
-    }
-    return fd;
-}
-
 static int send_all(int fd, struct iovec *parts, size_t count)
 {
     struct msghdr message = {.msg_iov = parts, .msg_iovlen = count};
@@ -104,6 +91,52 @@ static int receive_all(int fd, void *buffer, size_t count)
         count -= got;
     }
     return 0;
+}
+
+/* Drops the rest of a reply. */
+static int discard(int fd, size_t count)
+{
+    char words[256];
+    while (count) {
+        size_t part = count < sizeof words ? count : sizeof words;
+        if (receive_all(fd, words, part)) return -1;
+        count -= part;
+    }
+    return 0;
+}
+
+/* Begins a connection. A server that refuses it may have sent its answer already. */
+static int greet(int fd)
+{
+    uint32_t version = SOCKET_VERSION;
+    struct head head = {sizeof head - sizeof head.length + sizeof version, 0, CALL_HELLO};
+    struct iovec parts[2] = {{&head, sizeof head}, {&version, sizeof version}};
+    struct tail tail;
+    send_all(fd, parts, 2);
+    if (receive_all(fd, &tail, sizeof tail)) return -1;
+    if (tail.result < 0) {
+        errno = -tail.result;
+        return -1;
+    }
+    return discard(fd, tail.length - sizeof tail.result);
+}
+
+static int connect_bus(void)
+{
+    struct sockaddr_un address = {.sun_family = AF_UNIX};
+    strcpy(address.sun_path, config.socket);
+    int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0), failure = ENODEV;
+    if (fd < 0) return -1;
+    int refused;
+    do refused = connect(fd, (struct sockaddr *)&address, sizeof address);
+    while (refused && errno == EINTR);
+    if (!refused) {
+        if (!greet(fd)) return fd;
+        failure = errno == EIO || errno == ECONNRESET ? ENODEV : errno;
+    }
+    close(fd);
+    errno = failure;
+    return -1;
 }
 
 /* This process's connection; opened again if the program closed it or reused its number. */
@@ -157,6 +190,37 @@ static int receive_data(int fd, const struct sink *sink, size_t left)
     return 0;
 }
 
+/* As an adapter's driver in Linux, a call waits through signals and cancellation: a handler, a jump
+   out of one or a cancelled thread would leave the lock held and the connection in mid-reply. Signals
+   that end the program do so at once. */
+struct shield {
+    sigset_t signals;
+    int cancellation;
+};
+
+static void raise_shield(struct shield *before)
+{
+    static const int fatal[] = {SIGINT, SIGTERM, SIGHUP, SIGQUIT};
+    static const int faults[] = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTRAP, SIGABRT};
+    sigset_t blocked;
+    sigfillset(&blocked);
+    for (size_t i = 0; i < sizeof faults / sizeof *faults; i++) sigdelset(&blocked, faults[i]);
+    for (size_t i = 0; i < sizeof fatal / sizeof *fatal; i++) {
+        struct sigaction action;
+        if (!sigaction(fatal[i], NULL, &action) && action.sa_handler == SIG_DFL)
+            sigdelset(&blocked, fatal[i]);
+    }
+    pthread_sigmask(SIG_BLOCK, &blocked, &before->signals);
+    pthread_setcancelstate(PTHREAD_CANCEL_DISABLE, &before->cancellation);
+}
+
+static void lower_shield(const struct shield *before)
+{
+    int unused;
+    pthread_setcancelstate(before->cancellation, &unused);
+    pthread_sigmask(SIG_SETMASK, &before->signals, NULL);
+}
+
 /* Performs a call on the bus; parts[0] is reserved for its head. Returns as a system call. */
 static int perform(uint64_t key, int call, struct iovec *parts, size_t count, struct sink sink)
 {
@@ -166,10 +230,13 @@ static int perform(uint64_t key, int call, struct iovec *parts, size_t count, st
     head.length = (uint32_t)length;
     parts[0] = (struct iovec){&head, sizeof head};
     struct tail tail = {0};
+    struct shield shield;
+    raise_shield(&shield);
     pthread_mutex_lock(&lock);
     int fd = open_channel();
-    bool done = fd >= 0 && !send_all(fd, parts, count) && !receive_all(fd, &tail, sizeof tail) &&
-                !receive_data(fd, &sink, tail.length - sizeof tail.result);
+    bool done = fd >= 0 && !send_all(fd, parts, count) && !receive_all(fd, &tail, sizeof tail);
+    size_t left = tail.length - sizeof tail.result;
+    done = done && !(tail.result < 0 ? discard(fd, left) : receive_data(fd, &sink, left));
     int failure = errno;
     if (!done && fd >= 0) {
         close(fd); /* it may still carry data of this call */
@@ -177,6 +244,7 @@ static int perform(uint64_t key, int call, struct iovec *parts, size_t count, st
         if (failure == EPIPE || failure == ECONNRESET) failure = EIO;
     }
     pthread_mutex_unlock(&lock);
+    lower_shield(&shield);
     if (done && tail.result >= 0) return tail.result;
     errno = done ? -tail.result : failure;
     return -1;

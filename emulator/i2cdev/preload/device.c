@@ -33,8 +33,7 @@ static int open_device(int flags)
     struct head head = {sizeof head - sizeof head.length + sizeof chosen, inode, CALL_OPEN};
     struct iovec parts[2] = {{&head, sizeof head}, {&chosen, sizeof chosen}};
     struct tail tail = {0, -ENODEV};
-    send_all(fd, parts, 2); /* a server without room for it has sent its answer already */
-    if (receive_all(fd, &tail, sizeof tail) || tail.result < 0) {
+    if (send_all(fd, parts, 2) || receive_all(fd, &tail, sizeof tail) || tail.result < 0) {
         close(fd);
         return failed(-tail.result);
     }

@@ -4,7 +4,7 @@
  * (CUBESTACK_I2C_SOCKET). Each opened device file is a separate connection, so the kernel counts its
  * copies; the emulation identifies it by its inode, in all processes. Calls use another connection,
  * one per process. Constants such as MAX_MESSAGE_BYTES are defined by shim.py, from
- * firmware_model/formats/linux_i2c.py. A descriptor of a device file is a socket that is shut for
+ * firmware_model/formats/i2c_socket.py. A descriptor of a device file is a socket that is shut for
  * reading; what a socket does as a device file does (poll, lseek, mmap, dup and so on) is left to the
  * kernel.
  */
@@ -21,6 +21,7 @@
 #include <linux/openat2.h>
 #include <linux/sockios.h>
 #include <pthread.h>
+#include <signal.h>
 #include <stdarg.h>
 #include <stdbool.h>
 #include <stddef.h>

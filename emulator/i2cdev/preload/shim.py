@@ -15,7 +15,8 @@ from pathlib import Path
 from cubestack.emulator.i2cdev.device_node import DeviceNode
 from cubestack.emulator.native.cache import cache_folder
 from cubestack.emulator.native.compiler import CompilerError, NoCompilerError, run_compiler
-from cubestack.firmware_model.formats.linux_i2c import MAX_MESSAGE_BYTES, SMBUS_DATA_BYTES, Call
+from cubestack.firmware_model.formats.i2c_socket import VERSION, Call
+from cubestack.firmware_model.formats.linux_i2c import MAX_MESSAGE_BYTES, SMBUS_DATA_BYTES
 
 SOURCE = Path(__file__).with_name("shim.c")
 """It includes the other files of C in its folder."""
@@ -78,6 +79,7 @@ def _definitions() -> list[str]:
     text = listing.replace("\t", "\\t").replace("\n", "\\n")
     return [
         f'-DLISTING_FORMAT="{text}"',
+        f"-DSOCKET_VERSION={VERSION}",
         f"-DMAX_MESSAGE_BYTES={MAX_MESSAGE_BYTES}",
         f"-DSMBUS_DATA_BYTES={SMBUS_DATA_BYTES}",
         *(f"-DCALL_{call.name}={int(call)}" for call in Call),

@@ -7,6 +7,7 @@ from functools import partial
 from typing import NamedTuple
 
 from cubestack.emulator.i2cdev.seccomp.notify import Notification, read_memory, write_memory
+from cubestack.firmware_model.formats import i2c_socket
 from cubestack.firmware_model.formats import linux_i2c as linux
 
 MAX_PARTS = 1024
@@ -24,7 +25,7 @@ _PART = struct.Struct("=QQ")
 class Marshalled(NamedTuple):
     """A call for the emulated bus."""
 
-    call: linux.Call  # kind of call
+    call: i2c_socket.Call  # kind of call
     body: bytes  # its packed body
     # receives result and data of the reply, writes the data to the program's memory and returns the
     # result of the call; raises OSError
@@ -40,10 +41,14 @@ def ioctl(call: Notification) -> Marshalled:
             return _smbus(call, argument)
         case linux.Ioctl.FUNCS:
             return Marshalled(
-                linux.Call.IOCTL, linux.pack_ioctl(number, 0), partial(_put, call.pid, argument)
+                i2c_socket.Call.IOCTL,
+                i2c_socket.pack_ioctl(number, 0),
+                partial(_put, call.pid, argument),
             )
         case _:
-            return Marshalled(linux.Call.IOCTL, linux.pack_ioctl(number, argument), _without_data)
+            return Marshalled(
+                i2c_socket.Call.IOCTL, i2c_socket.pack_ioctl(number, argument), _without_data
+            )
 
 
 class Transfer(NamedTuple):
@@ -59,8 +64,10 @@ class Transfer(NamedTuple):
         """One part as a call; raises OSError."""
         count = min(count, linux.MAX_MESSAGE_BYTES)
         if self.reading:
-            return Marshalled(linux.Call.READ, linux.pack_read(count), partial(_put, pid, place))
-        return Marshalled(linux.Call.WRITE, read_memory(pid, place, count), _without_data)
+            return Marshalled(
+                i2c_socket.Call.READ, i2c_socket.pack_read(count), partial(_put, pid, place)
+            )
+        return Marshalled(i2c_socket.Call.WRITE, read_memory(pid, place, count), _without_data)
 
 
 def plain(call: Notification, *, reading: bool, positioned: bool = False) -> Transfer:
@@ -112,19 +119,19 @@ def _rdwr(call: Notification, argument: int) -> Marshalled:
 
     def finish(result: int, data: bytes) -> int:
         if result >= 0:
-            for place, part in zip(places, linux.split_rdwr(messages, data), strict=True):
+            for place, part in zip(places, i2c_socket.split_rdwr(messages, data), strict=True):
                 write_memory(call.pid, place, part)
         return result
 
-    return Marshalled(linux.Call.RDWR, linux.pack_rdwr(messages), finish)
+    return Marshalled(i2c_socket.Call.RDWR, i2c_socket.pack_rdwr(messages), finish)
 
 
 def _smbus(call: Notification, argument: int) -> Marshalled:
     found = _SMBUS.unpack(read_memory(call.pid, argument, _SMBUS.size))
     direction, command, size, place = found
     data = read_memory(call.pid, place, _given_bytes(direction, size)) if place else None
-    body = linux.pack_smbus(linux.SmbusCall(direction, command, size, data))
-    return Marshalled(linux.Call.SMBUS, body, partial(_put, call.pid, place))
+    body = i2c_socket.pack_smbus(linux.SmbusCall(direction, command, size, data))
+    return Marshalled(i2c_socket.Call.SMBUS, body, partial(_put, call.pid, place))
 
 
 def _given_bytes(direction: int, size: int) -> int:

@@ -25,7 +25,8 @@ from cubestack.emulator.i2cdev.seccomp.abi import Abi
 from cubestack.emulator.i2cdev.seccomp.notify import Listener, Notification, write_memory
 from cubestack.emulator.i2cdev.seccomp.path_calls import Handler, PathCalls, signed
 from cubestack.emulator.ports.endpoint import Endpoint
-from cubestack.firmware_model.formats.linux_i2c import Call, Ioctl, split_reply
+from cubestack.firmware_model.formats.i2c_socket import Call, split_reply
+from cubestack.firmware_model.formats.linux_i2c import Ioctl
 
 PIDFD_GETFD = 438  # the same on all machines
 LISTED_BYTES = 1 << 14

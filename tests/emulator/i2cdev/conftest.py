@@ -13,7 +13,16 @@ from cubestack.emulator.i2cdev.pacing import wait_precisely
 from cubestack.emulator.i2cdev.server import I2cServer
 from cubestack.emulator.ports.endpoint import poll_now
 from cubestack.emulator.sim.virtual_time import Kernel
-from cubestack.firmware_model.formats.linux_i2c import LENGTH, Call, request, split_reply
+from cubestack.firmware_model.formats.i2c_socket import (
+    LENGTH,
+    VERSION,
+    Call,
+    pack_hello,
+    packet,
+    request,
+    split_reply,
+    unpack_targets,
+)
 
 TIMEOUT = struct.pack("ll", 20, 0)  # 20 s, for a socket
 
@@ -84,9 +93,14 @@ def adapter(kernel: Kernel, bus: I2cBus) -> I2cAdapter:
     return I2cAdapter(kernel, bus)
 
 
+TARGETS = [("a sensor", 0x1A), ("another", 0x2B)]
+
+
 def packed(call: Call, body: bytes, key: int = 0) -> bytes:
-    data = request(key, call, body)
-    return LENGTH.pack(len(data)) + data
+    return packet(request(key, call, body))
+
+
+GREETING = packed(Call.HELLO, pack_hello())
 
 
 class Client:
@@ -118,15 +132,21 @@ class Client:
 
 class Served:
     def __init__(self, path: Path, adapter: I2cAdapter) -> None:
-        self.server = I2cServer(path, adapter)
+        self.server = I2cServer(path, adapter, TARGETS)
         self.kernel = adapter.env
         self.adapter = adapter
         self.opened: list[Client] = []
 
-    def connect(self) -> Client:
-        self.opened.append(Client(self.server.name))
+    def connect(self, *, greeting: bool = True) -> Client:
+        client = Client(self.server.name)
+        self.opened.append(client)
+        if greeting:
+            client.socket.sendall(GREETING)
         self.serve()
-        return self.opened[-1]
+        if greeting:
+            result, data = client.receive()
+            assert (result, unpack_targets(data)) == (VERSION, TARGETS)
+        return client
 
     def serve(self) -> None:
         while True:

@@ -10,7 +10,8 @@ from cubestack.emulator.bus.i2c import I2cBus, I2cError, I2cMessage
 from cubestack.emulator.i2cdev.adapter import I2cAdapter
 from cubestack.emulator.i2cdev.device_file import DeviceFile
 from cubestack.emulator.sim.virtual_time import Kernel
-from cubestack.firmware_model.formats.linux_i2c import Call, Ioctl, pack_ioctl, reply
+from cubestack.firmware_model.formats.i2c_socket import Call, pack_ioctl, reply
+from cubestack.firmware_model.formats.linux_i2c import Ioctl
 
 from .conftest import Registers
 

@@ -16,51 +16,60 @@ from cubestack.emulator.i2cdev import running, server
 from cubestack.emulator.i2cdev.adapter import I2cAdapter
 from cubestack.emulator.i2cdev.server import _Client
 from cubestack.emulator.ports.endpoint import PortError
+from cubestack.firmware_model.formats import i2c_socket
 from cubestack.firmware_model.formats import linux_i2c as linux
 
-from .conftest import packed
+from .conftest import GREETING, TARGETS, packed
 
-SLAVE = linux.pack_ioctl(linux.Ioctl.SLAVE, 0x1A)
-LARGEST = linux.pack_rdwr([linux.RdwrMessage(0x1A, 1, 8192)] * 42)
+READ_WRITE = i2c_socket.pack_open(os.O_RDWR)
+SLAVE = i2c_socket.pack_ioctl(linux.Ioctl.SLAVE, 0x1A)
+LARGEST = i2c_socket.pack_rdwr([linux.RdwrMessage(0x1A, 1, 8192)] * 42)
 
 
 def test_each_client_has_its_own_device_file(served):
     first, second = served.connect(), served.connect()
-    assert served.ask(first, linux.Call.IOCTL, SLAVE) == (0, b"")
-    assert served.ask(first, linux.Call.WRITE, b"\x41") == (1, b"")
-    assert served.ask(second, linux.Call.READ, linux.pack_read(1)) == (-errno.ENXIO, b"")
-    assert served.ask(first, linux.Call.READ, linux.pack_read(3)) == (3, b"ABC")
+    assert served.ask(first, i2c_socket.Call.IOCTL, SLAVE) == (0, b"")
+    assert served.ask(first, i2c_socket.Call.WRITE, b"\x41") == (1, b"")
+    assert served.ask(second, i2c_socket.Call.READ, i2c_socket.pack_read(1)) == (-errno.ENXIO, b"")
+    assert served.ask(first, i2c_socket.Call.READ, i2c_socket.pack_read(3)) == (3, b"ABC")
 
 
 def test_calls_reach_an_open_file_by_its_key_until_it_is_closed(served):
     opener, caller = served.connect(), served.connect()
-    assert served.ask(opener, linux.Call.OPEN, key=77) == (0, b"")
-    assert served.ask(caller, linux.Call.IOCTL, SLAVE, key=77) == (0, b"")
-    assert served.ask(caller, linux.Call.READ, linux.pack_read(1), key=77) == (1, b"\0")
-    assert served.ask(caller, linux.Call.READ, linux.pack_read(1), key=78) == (-errno.EBADF, b"")
+    assert served.ask(opener, i2c_socket.Call.OPEN, READ_WRITE, key=77) == (0, b"")
+    assert served.ask(caller, i2c_socket.Call.IOCTL, SLAVE, key=77) == (0, b"")
+    assert served.ask(caller, i2c_socket.Call.READ, i2c_socket.pack_read(1), key=77) == (1, b"\0")
+    assert served.ask(caller, i2c_socket.Call.READ, i2c_socket.pack_read(1), key=78) == (
+        -errno.EBADF,
+        b"",
+    )
     opener.socket.close()
     served.serve()
-    assert served.ask(caller, linux.Call.READ, linux.pack_read(1), key=77) == (-errno.EBADF, b"")
+    assert served.ask(caller, i2c_socket.Call.READ, i2c_socket.pack_read(1), key=77) == (
+        -errno.EBADF,
+        b"",
+    )
 
 
 def test_reused_key_survives_the_end_of_its_former_client(served):
     """The kernel reuses an inode number before the server sees the old client's end."""
     old, new, caller = served.connect(), served.connect(), served.connect()
-    served.ask(old, linux.Call.OPEN, key=77)
-    served.ask(new, linux.Call.OPEN, key=77)
+    served.ask(old, i2c_socket.Call.OPEN, READ_WRITE, key=77)
+    served.ask(new, i2c_socket.Call.OPEN, READ_WRITE, key=77)
     old.socket.close()
     served.serve()
-    assert served.ask(caller, linux.Call.IOCTL, SLAVE, key=77) == (0, b"")
+    assert served.ask(caller, i2c_socket.Call.IOCTL, SLAVE, key=77) == (0, b"")
 
 
 def test_clients_take_turns_by_whole_transfers(served, registers):
     clients = [served.connect() for _ in range(4)]
     for client in clients:
-        served.ask(client, linux.Call.IOCTL, SLAVE)
+        served.ask(client, i2c_socket.Call.IOCTL, SLAVE)
     registers.log.clear()
     for number, client in enumerate(clients):
         client.send(
-            linux.Call.RDWR, linux.pack_rdwr([linux.RdwrMessage(0x1A, 0, 1, bytes([number]))] * 3)
+            i2c_socket.Call.RDWR,
+            i2c_socket.pack_rdwr([linux.RdwrMessage(0x1A, 0, 1, bytes([number]))] * 3),
         )
     served.serve()
     assert [client.receive()[0] for client in clients] == [3] * 4
@@ -72,33 +81,33 @@ def test_clients_take_turns_by_whole_transfers(served, registers):
 def test_calls_sent_together_are_answered_in_order(served):
     """All but the first are read before their turn."""
     client = served.connect()
-    served.ask(client, linux.Call.IOCTL, SLAVE)
-    client.socket.sendall(packed(linux.Call.READ, linux.pack_read(1)) * 3)
+    served.ask(client, i2c_socket.Call.IOCTL, SLAVE)
+    client.socket.sendall(packed(i2c_socket.Call.READ, i2c_socket.pack_read(1)) * 3)
     served.serve()
     assert [client.receive() for _ in range(3)] == [(1, b"\0"), (1, b"\1"), (1, b"\2")]
 
 
 def test_server_returns_the_largest_transfer(served):
     client = served.connect()
-    client.send(linux.Call.RDWR, LARGEST)
+    client.send(i2c_socket.Call.RDWR, LARGEST)
     served.serve()
     client.socket.setblocking(False)  # the rest of the answer waits for room
     received = bytearray()
-    while len(received) < linux.LENGTH.size + 4 + 42 * 8192:
+    while len(received) < i2c_socket.LENGTH.size + 4 + 42 * 8192:
         try:
             received += client.socket.recv(1 << 20)
         except BlockingIOError:
             served.serve()
-    assert linux.LENGTH.unpack_from(received)[0] == 4 + 42 * 8192
+    assert i2c_socket.LENGTH.unpack_from(received)[0] == 4 + 42 * 8192
 
 
 def test_client_that_does_not_read_blocks_no_other(served):
     stuck, other = served.connect(), served.connect()
     for _ in range(3):
-        stuck.send(linux.Call.RDWR, LARGEST)
+        stuck.send(i2c_socket.Call.RDWR, LARGEST)
     served.serve()
-    served.ask(other, linux.Call.IOCTL, SLAVE)
-    assert served.ask(other, linux.Call.READ, linux.pack_read(1))[0] == 1
+    served.ask(other, i2c_socket.Call.IOCTL, SLAVE)
+    assert served.ask(other, i2c_socket.Call.READ, i2c_socket.pack_read(1))[0] == 1
 
 
 class Babbler:
@@ -111,7 +120,7 @@ class Babbler:
     def recv(self, _size: int) -> bytes:
         self.looks += 1
         assert self.looks < 10
-        return packed(linux.Call.IOCTL, SLAVE)
+        return GREETING if self.looks == 1 else packed(i2c_socket.Call.IOCTL, SLAVE)
 
     def send(self, data: bytes) -> int:
         return len(data)
@@ -119,7 +128,7 @@ class Babbler:
 
 def test_endlessly_sending_client_yields_after_each_call(adapter):
     babbler = Babbler()
-    client = _Client(babbler, adapter, {}, lambda _events: None)
+    client = _Client(babbler, adapter, b"", {}, lambda _events: None)
     client.exchange(hung_up=False)
     client.exchange(hung_up=False)
     assert babbler.looks == 2
@@ -128,21 +137,21 @@ def test_endlessly_sending_client_yields_after_each_call(adapter):
 def test_unread_requests_wait_in_the_socket_buffer(served, registers):
     client = served.connect()
     client.socket.setblocking(False)
-    frame, sent = packed(linux.Call.IOCTL, SLAVE), 0
+    frame, sent = packed(i2c_socket.Call.IOCTL, SLAVE), 0
     with suppress(BlockingIOError):
         while True:
             sent += client.socket.send(frame)
     assert sent < 1 << 20
     client.socket.setblocking(True)
     other = served.connect()
-    assert served.ask(other, linux.Call.IOCTL, SLAVE) == (0, b"")
+    assert served.ask(other, i2c_socket.Call.IOCTL, SLAVE) == (0, b"")
     for _ in range(sent // len(frame)):
         assert client.receive() == (0, b"")
         served.serve()
 
 
 def test_partial_call_does_not_spin_the_server(served):
-    client, call = served.connect(), packed(linux.Call.IOCTL, SLAVE)
+    client, call = served.connect(), packed(i2c_socket.Call.IOCTL, SLAVE)
     client.socket.sendall(call + call[:5])
     for _ in range(3):
         served.server.exchange(0)
@@ -157,48 +166,76 @@ def test_partial_call_does_not_spin_the_server(served):
 @pytest.mark.parametrize("cut", [1, 4, 5, 12])
 def test_client_that_dies_within_a_message_is_dropped(served, cut):
     client, other = served.connect(), served.connect()
-    client.socket.sendall(packed(linux.Call.READ, linux.pack_read(1))[:cut])
+    client.socket.sendall(packed(i2c_socket.Call.READ, i2c_socket.pack_read(1))[:cut])
     served.serve()
     client.reset()
-    assert served.ask(other, linux.Call.IOCTL, SLAVE) == (0, b"")
+    assert served.ask(other, i2c_socket.Call.IOCTL, SLAVE) == (0, b"")
     assert served.server.clients == 1
 
 
 def test_transfer_completes_after_its_client_died(served, registers):
     client, other = served.connect(), served.connect()
-    client.send(linux.Call.RDWR, linux.pack_rdwr([linux.RdwrMessage(0x1A, 0, 3, b"\x20\xaa\xbb")]))
+    client.send(
+        i2c_socket.Call.RDWR, i2c_socket.pack_rdwr([linux.RdwrMessage(0x1A, 0, 3, b"\x20\xaa\xbb")])
+    )
     served.server.exchange(0)
     assert served.adapter.busy
     client.socket.close()
     served.server.exchange(0)
-    assert served.ask(other, linux.Call.IOCTL, SLAVE) == (0, b"")
+    assert served.ask(other, i2c_socket.Call.IOCTL, SLAVE) == (0, b"")
     assert registers.memory[0x20:0x22] == b"\xaa\xbb"  # the bus goes on
     assert served.server.clients == 1
 
 
 @pytest.mark.parametrize(
-    "data",
+    ("data", "words"),
     [
-        linux.LENGTH.pack(linux.MAX_REQUEST_BYTES + 1),
-        linux.LENGTH.pack(0),
-        linux.LENGTH.pack(9) + bytes(8) + b"\x63",
-        linux.LENGTH.pack(10) + bytes(8) + bytes([linux.Call.IOCTL]) + b"x",
-        linux.LENGTH.pack(20) + bytes(8) + bytes([linux.Call.RDWR]) + b"\xff" * 11,
+        (
+            i2c_socket.LENGTH.pack(i2c_socket.MAX_REQUEST_BYTES + 1),
+            "a request has at most 344409 bytes, not 344410",
+        ),
+        (i2c_socket.LENGTH.pack(0), "a request has at least 9 bytes, not 0"),
+        (i2c_socket.packet(bytes(8) + b"\x63"), "no call has the number 99"),
+        (packed(i2c_socket.Call.IOCTL, b"x"), "the fields have 12 bytes, not 1"),
+        (packed(i2c_socket.Call.RDWR, b"\xff" * 11), "a message of RDWR breaks off"),
+        (packed(i2c_socket.Call.HELLO, b"x"), "the fields have 4 bytes, not 1"),
+        (
+            packed(i2c_socket.Call.HELLO, i2c_socket.pack_hello(2)),
+            "this emulation speaks version 1 of the protocol, not 2",
+        ),
     ],
 )
-def test_invalid_message_closes_the_connection(served, data):
+def test_invalid_message_is_refused_in_words_and_closes_the_connection(served, data, words):
     client, other = served.connect(), served.connect()
     client.socket.sendall(data)
     served.serve()
+    assert client.receive() == (-errno.EPROTO, words.encode())
     assert client.hung_up()
-    assert served.ask(other, linux.Call.IOCTL, SLAVE) == (0, b"")
+    assert served.ask(other, i2c_socket.Call.IOCTL, SLAVE) == (0, b"")
+
+
+def test_connection_without_a_greeting_is_refused(served):
+    client = served.connect(greeting=False)
+    assert served.ask(client, i2c_socket.Call.IOCTL, SLAVE) == (
+        -errno.EPROTO,
+        b"a connection begins with HELLO, not with IOCTL",
+    )
+    assert client.hung_up()
+
+
+def test_greeting_of_a_later_version_is_understood(served):
+    """Later versions may append to it; ours stays the same."""
+    client = served.connect(greeting=False)
+    body = i2c_socket.pack_hello() + b"something new"
+    result, data = served.ask(client, i2c_socket.Call.HELLO, body)
+    assert (result, i2c_socket.unpack_targets(data)) == (i2c_socket.VERSION, TARGETS)
 
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=100)
 @given(st.binary(min_size=1, max_size=200))
 def test_arbitrary_bytes_do_not_harm_the_server(served, data):
     client = served.connect()
-    client.socket.sendall(linux.LENGTH.pack(len(data)) + data)
+    client.socket.sendall(i2c_socket.packet(data))
     served.serve()
     client.socket.close()
     served.serve()
@@ -209,19 +246,19 @@ def test_arbitrary_bytes_do_not_harm_the_server(served, data):
 def test_client_beyond_the_limit_of_descriptors_gets_enfile(served, monkeypatch):
     first = served.connect()
     monkeypatch.setattr(server, "has_room", lambda _descriptor: False)
-    late = served.connect()
+    late = served.connect(greeting=False)
     assert late.receive() == (-errno.ENFILE, b"")
     assert late.hung_up()
     assert served.server.clients == 1
     monkeypatch.undo()
-    assert served.ask(first, linux.Call.IOCTL, SLAVE) == (0, b"")
-    assert served.ask(served.connect(), linux.Call.IOCTL, SLAVE) == (0, b"")
+    assert served.ask(first, i2c_socket.Call.IOCTL, SLAVE) == (0, b"")
+    assert served.ask(served.connect(), i2c_socket.Call.IOCTL, SLAVE) == (0, b"")
 
 
 def test_hundreds_of_clients_are_served(served):
     clients = [served.connect() for _ in range(300)]
     assert served.server.clients == 300
-    assert served.ask(clients[-1], linux.Call.IOCTL, SLAVE) == (0, b"")
+    assert served.ask(clients[-1], i2c_socket.Call.IOCTL, SLAVE) == (0, b"")
 
 
 @pytest.mark.parametrize(
@@ -236,18 +273,18 @@ def test_hundreds_of_clients_are_served(served):
 )
 def test_flags_of_open_decide_which_calls_are_allowed(served, flags, read, write, ioctl):
     opener, caller = served.connect(), served.connect()
-    body = linux.pack_open(flags | os.O_NONBLOCK)
-    assert served.ask(opener, linux.Call.OPEN, body, key=5) == (0, b"")
-    assert served.ask(caller, linux.Call.MODE, key=5) == (flags, b"")
-    assert served.ask(caller, linux.Call.IOCTL, SLAVE, key=5)[0] == ioctl
-    assert served.ask(caller, linux.Call.WRITE, b"\x41", key=5)[0] == write
-    assert served.ask(caller, linux.Call.READ, linux.pack_read(1), key=5)[0] == read
+    body = i2c_socket.pack_open(flags | os.O_NONBLOCK)
+    assert served.ask(opener, i2c_socket.Call.OPEN, body, key=5) == (0, b"")
+    assert served.ask(caller, i2c_socket.Call.MODE, key=5) == (flags, b"")
+    assert served.ask(caller, i2c_socket.Call.IOCTL, SLAVE, key=5)[0] == ioctl
+    assert served.ask(caller, i2c_socket.Call.WRITE, b"\x41", key=5)[0] == write
+    assert served.ask(caller, i2c_socket.Call.READ, i2c_socket.pack_read(1), key=5)[0] == read
 
 
 def test_request_wakes_a_waiting_server(served):
     client = served.connect()
     served.wait(0.0)
-    client.send(linux.Call.IOCTL, SLAVE)
+    client.send(i2c_socket.Call.IOCTL, SLAVE)
     served.wait(20.0)  # returns at once
     served.serve()
     assert client.receive() == (0, b"")

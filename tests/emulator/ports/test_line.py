@@ -12,7 +12,8 @@ from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.i2cdev.direct import DirectI2c
 from cubestack.emulator.ports.line import DirectSerial, HostLine
 from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
-from cubestack.firmware_model.formats.linux_i2c import Call, Ioctl, pack_ioctl, pack_read
+from cubestack.firmware_model.formats.i2c_socket import Call, pack_ioctl, pack_read
+from cubestack.firmware_model.formats.linux_i2c import Ioctl
 
 from ..bus.ends import Memory
 from .conftest import ALL_BYTES

@@ -24,10 +24,10 @@ from cubestack.emulator.ports.pseudo_terminal import PtyEndpoint
 from cubestack.emulator.ports.realtime import RealtimeScheduler
 from cubestack.emulator.ports.serial_port import MAX_UNREAD, MAX_UNSENT
 from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
-from cubestack.firmware_model.formats import linux_i2c
+from cubestack.firmware_model.formats import i2c_socket, linux_i2c
 
 from ..bus.ends import Memory
-from ..i2cdev.conftest import packed
+from ..i2cdev.conftest import GREETING, packed
 from .conftest import ALL_BYTES, TIMEOUT_S, Client, Device, Wall, open_client, open_port, served
 
 # pyserial calls setDaemon and setName of a thread.
@@ -154,10 +154,10 @@ def serve(kernel: Kernel, ports, busy, waits: int, step: Callable[[int], None]) 
     scheduler.run()
 
 
-SLAVE = linux_i2c.pack_ioctl(linux_i2c.Ioctl.SLAVE, ADDRESS)
-SET_ADDRESS = packed(linux_i2c.Call.IOCTL, SLAVE)
-READING = linux_i2c.pack_rdwr([linux_i2c.RdwrMessage(ADDRESS, 1, 8)])
-READ_BYTES = packed(linux_i2c.Call.RDWR, READING)
+SLAVE = i2c_socket.pack_ioctl(linux_i2c.Ioctl.SLAVE, ADDRESS)
+SET_ADDRESS = packed(i2c_socket.Call.IOCTL, SLAVE)
+READING = i2c_socket.pack_rdwr([linux_i2c.RdwrMessage(ADDRESS, 1, 8)])
+READ_BYTES = packed(i2c_socket.Call.RDWR, READING)
 
 
 class Desk:
@@ -182,6 +182,7 @@ class Desk:
         for role in ROLES:
             connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
             connection.connect(self.server.name)
+            connection.sendall(GREETING)
             self.clients["i2c", role] = Client(connection)
         for client in self.clients.values():
             stack.callback(client.close)
@@ -226,7 +227,7 @@ def test_well_behaved_clients_are_served_beside_bad_ones(tmp_path):
             assert desk.lines[kind, "flood"].uart.host_backlog <= MAX_UNSENT
             assert desk.lines[kind, "stopped"].received == HALF_A_FRAME
             assert len(desk.ports[kind, "unread"]._unread) <= MAX_UNREAD
-        assert got["i2c"] > 200 * (linux_i2c.LENGTH.size + 4 + 8)
+        assert got["i2c"] > 200 * (i2c_socket.LENGTH.size + 4 + 8)
         assert desk.server.clients == len(ROLES)
         assert (grown, peak) < (SPARE_BYTES, SPARE_BYTES)
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from cubestack.emulator.native.compiler import find_compiler
-from cubestack.firmware_model.formats.linux_i2c import socket_path
+from cubestack.firmware_model.formats.i2c_socket import socket_path
 from cubestack.firmware_model.formats.recording import load_recording
 from cubestack.host.cli import emulate
 from cubestack.host.emulation.process import emulating

@@ -15,12 +15,13 @@ from smbus2 import SMBus, i2c_msg
 from cubestack.emulator.bus.i2c import I2cBus
 from cubestack.emulator.i2cdev.direct import DirectI2c
 from cubestack.emulator.sim.virtual_time import Kernel
-from cubestack.firmware_model.formats import linux_i2c
+from cubestack.firmware_model.formats import i2c_socket
 from cubestack.firmware_model.formats.linux_i2c import MessageFlag
 from cubestack.host.errors import PortClosedError, PortOpenError
 from cubestack.host.transport.smbus import CubeSMBus, _find_socket
 
 ADDRESS = 0x1A
+GREETING = i2c_socket.packet(i2c_socket.reply(i2c_socket.VERSION))
 
 
 class Echo:
@@ -151,13 +152,14 @@ def test_missing_emulation_is_reported(bus: int | str) -> None:
 
 
 @contextmanager
-def answering(path: Path, reply: bytes) -> Iterator[str]:
-    """A socket that answers the first request of one client."""
+def answering(path: Path, *replies: bytes) -> Iterator[str]:
+    """A socket that answers the requests of one client."""
 
     def answer() -> None:
         with listening.accept()[0] as connection:
-            connection.recv(1 << 12)
-            connection.sendall(reply)
+            for data in replies:
+                connection.recv(1 << 12)
+                connection.sendall(data)
 
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as listening:
         listening.bind(str(path))
@@ -171,16 +173,24 @@ def answering(path: Path, reply: bytes) -> Iterator[str]:
 @pytest.mark.parametrize("reply", [b"", b"\x01", b"\x10\x00\x00\x00abc"])
 def test_emulation_that_ends_during_an_answer(tmp_path: Path, reply: bytes) -> None:
     with (
-        answering(tmp_path / "bus", reply) as path,
+        answering(tmp_path / "bus", GREETING, reply) as path,
         pytest.raises(PortClosedError, match="the emulation has ended"),
     ):
         CubeSMBus(path)
 
 
+def test_emulation_of_another_version_is_reported(tmp_path: Path) -> None:
+    refusal = i2c_socket.packet(i2c_socket.reply(-errno.EPROTO, b"this is version 2"))
+    with (
+        answering(tmp_path / "bus", refusal) as path,
+        pytest.raises(PortOpenError, match="bus refuses: this is version 2"),
+    ):
+        CubeSMBus(path)
+
+
 def test_open_bus_has_a_file_descriptor(tmp_path: Path) -> None:
-    functions = linux_i2c.reply(0, bytes(8))
-    reply = linux_i2c.LENGTH.pack(len(functions)) + functions
-    with answering(tmp_path / "bus", reply) as path:
+    reply = i2c_socket.packet(i2c_socket.reply(0, bytes(8)))
+    with answering(tmp_path / "bus", GREETING, reply) as path:
         bus = CubeSMBus(path)
     assert stat.S_ISSOCK(os.fstat(bus.fd).st_mode)
     bus.close()
@@ -200,6 +210,6 @@ def test_program_under_run_uses_its_bus(
         else:
             monkeypatch.setenv(f"CUBESTACK_I2C_{name}", value)
     wanted = int(number or 7)
-    served = Path("/the/socket") if own else linux_i2c.socket_path(wanted)
+    served = Path("/the/socket") if own else i2c_socket.socket_path(wanted)
     assert _find_socket(wanted) == _find_socket(f"/dev/i2c-{wanted}") == served
     assert _find_socket("/some/where") == Path("/some/where")

@@ -26,6 +26,8 @@ ROUTES = ("seccomp", "preload")
 
 LATCH = 0x50  # address of a second device on the bus, which accepts the general call
 
+TARGETS = [("cubestar", 0x1A), ("latch", LATCH)]
+
 needs_tools = pytest.mark.skipif(
     shutil.which("i2ctransfer", path=ENVIRONMENT["PATH"]) is None, reason="no i2c-tools here"
 )
@@ -57,7 +59,7 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         board.i2c_bus.attach(LATCH, Latch(), general_call=True)
         adapter = I2cAdapter(board.kernel, board.i2c_bus)
         with (
-            closing(I2cServer(path, adapter)) as server,
+            closing(I2cServer(path, adapter, TARGETS)) as server,
             open_scheduler(
                 board.kernel, [], board.busy, pace="fast", i2c=adapter, i2c_ports=[server]
             ) as scheduler,
@@ -75,7 +77,10 @@ def route(request: pytest.FixtureRequest, served: Path) -> str:
     found = start("--route", name, "--attach", served, "--", "true")
     if found.code:
         pytest.skip(f"no {name} route here: {found.err.strip()}")
-    assert found.err == f"/dev/i2c-7 is served by {name}, as requested\n"
+    assert found.err == (
+        "I2C bus 7: cubestar at 0x1a, latch at 0x50\n"
+        f"/dev/i2c-7 is served by {name}, as requested\n"
+    )
     return name
 
 

@@ -15,7 +15,7 @@ from cubestack.emulator.i2cdev.device_node import DeviceNode
 from cubestack.emulator.i2cdev.seccomp import path_calls, supervisor
 from cubestack.emulator.i2cdev.seccomp.abi import native_abi
 from cubestack.emulator.i2cdev.seccomp.notify import Notification
-from cubestack.firmware_model.formats import linux_i2c as linux
+from cubestack.firmware_model.formats import i2c_socket
 
 
 @pytest.mark.parametrize("value", [0, 1, 3, 100, 2**31 - 1, -1, -100, -(2**31)])
@@ -26,20 +26,20 @@ def test_int_argument_is_taken_from_the_low_32_bits(value: int) -> None:
 
 class File:
     def __init__(self) -> None:
-        self.asked: list[tuple[linux.Call, bytes]] = []
+        self.asked: list[tuple[i2c_socket.Call, bytes]] = []
         self.waiting: list[Callable[[bytes], None]] = []
         self.result, self.data, self.closed = 0, b"", False
         self.late = False
         self.results: list[int] = []  #: of the next calls, instead of ``result``
 
-    def perform(self, call: linux.Call, body: bytes, done: Callable[[bytes], None]) -> None:
+    def perform(self, call: i2c_socket.Call, body: bytes, done: Callable[[bytes], None]) -> None:
         self.asked.append((call, body))
         if self.results:
-            done(linux.reply(self.results.pop(0)))
+            done(i2c_socket.reply(self.results.pop(0)))
         elif self.late:
             self.waiting.append(done)
         else:
-            done(linux.reply(self.result, self.data))
+            done(i2c_socket.reply(self.result, self.data))
 
     def close(self) -> None:
         self.closed = True
@@ -273,8 +273,8 @@ def test_read_and_write_calls_reach_the_device_file(program: Program) -> None:
     assert program("pread64", fd, place, 3, -1) == -errno.EINVAL
     assert program("read", fd, 8, 8) == -errno.EFAULT  # where nothing is
     assert program("write", fd, 8, 8) == -errno.EFAULT
-    read, write = (linux.Call.READ, linux.pack_read(3)), (linux.Call.WRITE, b"abc")
-    assert file.asked[:4] == [read, (linux.Call.WRITE, b"hel"), read, write]
+    read, write = (i2c_socket.Call.READ, i2c_socket.pack_read(3)), (i2c_socket.Call.WRITE, b"abc")
+    assert file.asked[:4] == [read, (i2c_socket.Call.WRITE, b"hel"), read, write]
     assert program("read", 0, place, 8) == "pass"
     assert program("read", 99_999, place, 8) == "pass"
 
@@ -290,16 +290,16 @@ def test_parts_of_a_vector_are_calls_of_their_own(
     (file,), place = program.files, program.memory(b"abcdefgh")
     parts = program.memory(struct.pack("=8Q", place, 3, 1, 0, place + 3, 5, 1, 0))
 
-    def asked() -> list[tuple[linux.Call, bytes]]:
+    def asked() -> list[tuple[i2c_socket.Call, bytes]]:
         calls, file.asked = file.asked, []
         return calls
 
     file.results = [3, 0, 5]  # the empty part at the end is none
     assert program(writing, fd, parts, 4, *rest) == 8
-    assert asked() == [(linux.Call.WRITE, data) for data in (b"abc", b"", b"defgh")]
+    assert asked() == [(i2c_socket.Call.WRITE, data) for data in (b"abc", b"", b"defgh")]
     file.results = [3, 0, 4]
     assert program(reading, fd, parts, 4, *rest) == 7
-    assert asked() == [(linux.Call.READ, linux.pack_read(count)) for count in (3, 0, 5)]
+    assert asked() == [(i2c_socket.Call.READ, i2c_socket.pack_read(count)) for count in (3, 0, 5)]
     for results, expected, calls in (([2], 2, 1), ([-6], -6, 1), ([3, -6], 3, 2)):
         file.results = results  # short, failed at once, failed later
         assert program(writing, fd, parts, 4, *rest) == expected
@@ -321,11 +321,11 @@ def test_late_answers_are_passed_on_unless_the_caller_was_killed(program: Progra
     (file,) = program.files
     file.late = True
     assert program("read", fd, program.memory(bytes(4)), 4) is None
-    file.waiting.pop()(linux.reply(-errno.ENXIO, b""))
+    file.waiting.pop()(i2c_socket.reply(-errno.ENXIO, b""))
     assert program.kernel.answers[2] == -errno.ENXIO
     assert program("read", fd, program.memory(bytes(4)), 4) is None
     program.kernel.killed = True  # meanwhile
-    file.waiting.pop()(linux.reply(1, b"x"))
+    file.waiting.pop()(i2c_socket.reply(1, b"x"))
     assert 3 not in program.kernel.answers
 
 
