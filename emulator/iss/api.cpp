@@ -7,12 +7,14 @@
 
 #include "armv7m/core/cpu.h"
 #include "armv7m/system/system.h"
+#include "efm32gg/analog/dac.h"
 #include "efm32gg/part/part.h"
 #include "efm32gg/pins/gpio.h"
 #include "efm32gg/serial/i2c.h"
 #include "fpga_link.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <memory>
 #include <new>
@@ -242,6 +244,11 @@ void iss_pin(IssMachine *machine, int32_t port, int32_t bit, int32_t level) {
 
 int32_t iss_pin_level(const IssMachine *machine, int32_t port, int32_t bit) {
     return machine->part ? machine->part->gpio->level(port, bit) : 0;
+}
+
+// Volts that the DAC drives at a pin; NaN if it does not.
+double iss_pin_volts(const IssMachine *machine, int32_t port, int32_t bit) {
+    return machine->part ? machine->part->dac->pin_volts(port * 16 + bit) : std::nan("");
 }
 
 void iss_uart_receive(IssMachine *machine, int32_t unit, uint32_t data, uint32_t flags) {

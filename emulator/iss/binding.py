@@ -119,6 +119,7 @@ _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "iss_invalidate": (None, (_P, _U, _L)),
     "iss_pin": (None, (_P, _I, _I, _I)),
     "iss_pin_level": (_I, (_P, _I, _I)),
+    "iss_pin_volts": (ctypes.c_double, (_P, _I, _I)),
     "iss_uart_receive": (None, (_P, _I, _U, _U)),
     "iss_i2c_slave": (_I, (_P, _I, _I, _I)),
     "iss_i2c_answer": (None, (_P, _I, _I, _I)),

@@ -5,6 +5,7 @@ two runs. A running machine never calls Python, except for an FPGA without a com
 """
 
 import ctypes
+import math
 from collections.abc import Iterator, MutableSet
 
 import numpy as np
@@ -247,6 +248,11 @@ class Machine:
 
     def pin_level(self, port: int, bit: int) -> int:
         return int(self._library.iss_pin_level(self.handle, port, bit))
+
+    def pin_millivolts(self, port: int, bit: int) -> float | None:
+        """Voltage that the DAC drives at a port pin; None if it does not."""
+        volts = float(self._library.iss_pin_volts(self.handle, port, bit))
+        return None if math.isnan(volts) else 1000 * volts
 
     def uart_receive(self, unit: int, data: int, flags: int = 0) -> None:
         """Deliver a complete character to a serial block.

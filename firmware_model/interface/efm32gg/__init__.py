@@ -1,5 +1,6 @@
 """Registers of the EFM32GG280F1024, the source of simulator, C header and traces."""
 
+from cubestack.firmware_model.interface.efm32gg.aes import AES
 from cubestack.firmware_model.interface.efm32gg.analog import ANALOG
 from cubestack.firmware_model.interface.efm32gg.ports import PORTS
 from cubestack.firmware_model.interface.efm32gg.serial import SERIAL
@@ -18,13 +19,6 @@ def _absent(name: str, title: str, names: str, *instances: Instance) -> Layout:
 #: that a program is likely to access are declared, so that reports can name them.
 _UNMODELLED = (
     _absent(
-        "AES",
-        "Encryption accelerator; chapter 38",
-        "CTRL CMD STATUS IEN IF IFS IFC DATA XORDATA RESERVED0 RESERVED1 RESERVED2 "
-        "KEYLA KEYLB KEYLC KEYLD KEYHA KEYHB KEYHC KEYHD",
-        Instance("AES", 0x400E0000, {"AES": 36}),
-    ),
-    _absent(
         "LESENSE",
         "Low energy sensor interface; chapter 24",
         "CTRL TIMCTRL PERCTRL DECCTRL BIASCTRL CMD CHEN SCANRES STATUS PTR BUFDATA CURCH DECSTATE",
@@ -35,7 +29,7 @@ _UNMODELLED = (
 #: All kinds of peripherals of the part.
 LAYOUTS: tuple[Layout, ...] = (
     *(*SYSTEM, *CLOCKS, *PORTS, *EXTERNAL_BUS),
-    *(*SERIAL, *TIMERS, *ANALOG, DMA),
+    *(*SERIAL, *TIMERS, *ANALOG, DMA, AES),
     *_UNMODELLED,
 )
 

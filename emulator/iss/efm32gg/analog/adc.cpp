@@ -1,6 +1,7 @@
 // ADC: single conversions and scans. EFM32GG Reference Manual, chapter 28.
 //
-// Conversions are ideal: no noise, offset or gain error. DAC outputs read 0 V.
+// Conversions are ideal: no noise, offset or gain error.
+#include "efm32gg/analog/dac.h"
 #include "efm32gg/memory/dma.h"
 #include "efm32gg/part/part.h"
 #include "efm32gg/pins/prs.h"
@@ -137,6 +138,8 @@ private:
         case VDD_THIRD: return part.volts(analog::VDD) / 3;
         case VDD: return part.volts(analog::VDD);
         case REFERENCE_HALF: return reference / 2;
+        case DAC0: return part.dac->internal_volts(0);
+        case DAC1: return part.dac->internal_volts(1);
         default: return 0;
         }
     }

@@ -1,6 +1,7 @@
 // Comparators: ACMP of two voltages, VCMP of the supply. EFM32GG Reference Manual, chapters 26
 // and 27. They compare when an input or their registers change; the response time is not modelled.
-// Not modelled: capacitive sense; DAC outputs are 0 V.
+// Not modelled: capacitive sense.
+#include "efm32gg/analog/dac.h"
 #include "efm32gg/part/part.h"
 #include "efm32gg/pins/gpio.h"
 #include "efm32gg/pins/prs.h"
@@ -121,6 +122,8 @@ private:
             against = 2.5;
         else if (negative == 10)
             against = supply * field(selected, acmp::INPUTSEL_VDDLEVEL) / 63;
+        else if (negative == 12 || negative == 13)
+            against = part.dac->internal_volts((int)negative - 12);
         const double step = HYSTERESIS[field(reg(CTRL), acmp::CTRL_HYSTSEL)];
         return part.volts(channels + (int)field(selected, acmp::INPUTSEL_POSSEL)) >
                against + (before ? -step : step);

@@ -29,6 +29,7 @@ class Prs;
 class I2c;
 class SerialReceiver;
 class Timer;
+class Dac;
 
 enum class Clock { HFCORE, HFPER, HFCORELE, LFA, LFB, HFRCO, HFXO, AUXHFRCO, LFXO, LFRCO, ULFRCO };
 constexpr int CLOCKS = 11;
@@ -186,6 +187,7 @@ public:
     std::vector<SerialReceiver *> receivers;  // USARTs and LEUARTs, by unit number
     std::vector<I2c *> i2cs;
     std::vector<Timer *> timers;
+    Dac *dac = nullptr;
 
     // Takes ownership of a peripheral.
     template <class Unit> Unit *add(Unit *unit) {
@@ -244,6 +246,7 @@ void add_leuart(Part &part, const Instance &instance, int source, int signals);
 void add_low_energy_timers(Part &part);
 void add_pulse_counters(Part &part);
 void add_adc(Part &part);
+void add_aes(Part &part);
 void add_comparators(Part &part);
 
 }  // namespace efm32gg

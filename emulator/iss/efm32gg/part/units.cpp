@@ -1,5 +1,6 @@
 // Creates the part's peripherals, and finds serial units by number or pin.
 #include "armv7m/core/cpu.h"
+#include "efm32gg/analog/dac.h"
 #include "efm32gg/clocks/cmu.h"
 #include "efm32gg/clocks/emu.h"
 #include "efm32gg/clocks/rmu.h"
@@ -29,6 +30,7 @@ void Part::add_units() {
     prs = add(new Prs(*this, instance::PRS));
     add_watchdog(*this);
     dma = add(new Dma(*this, instance::DMA));
+    add_aes(*this);
     // Numbers: DMA source, then PRS source (CHn_CTRL of either), then the first of the unit's pins.
     add_usart(*this, instance::USART0, 12, 16, route::USART0_TX);
     add_usart(*this, instance::USART1, 13, 17, route::USART1_TX);
@@ -46,7 +48,7 @@ void Part::add_units() {
     add_low_energy_timers(*this);
     add_pulse_counters(*this);
     add_adc(*this);
-    add(new Peripheral(*this, instance::DAC0));  // registers only, no output voltage
+    dac = add(new Dac(*this, instance::DAC0));
     add_comparators(*this);
     for (const Instance *one : INSTANCES)
         if (one->base >= PERIPHERALS && !peripheral_at(one->base))
