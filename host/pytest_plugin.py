@@ -24,7 +24,7 @@ import pytest
 
 from cubestack.firmware_model.interface.codec.switches import DEFAULT_PROFILE, PROFILES
 from cubestack.host.devices.device import ENGINE_FORM, Engine, engine_name
-from cubestack.host.devices.registry import device_names, devices
+from cubestack.host.devices.registry import devices, emulated_names
 from cubestack.host.emulation.virtual_clock import VirtualClock
 
 if TYPE_CHECKING:
@@ -78,7 +78,7 @@ def pytest_configure(config: pytest.Config) -> None:
         f"{MARKER}({', '.join(KEYS)}, profile, ...): set up the emulated device of this test",
     )
     fixtures = ModuleType("cubestack_fixtures")
-    for name in device_names():
+    for name in emulated_names():
         setattr(fixtures, name, _fixture(name))
     config.pluginmanager.register(fixtures, "cubestack-fixtures")
 
@@ -122,7 +122,8 @@ def _fixture(name: str) -> Any:
 def _options(item: pytest.Item) -> dict[str, Any]:
     options: dict[str, Any] = {}
     for marker in reversed(list(item.iter_markers(MARKER))):  # the closest marker wins
-        known = dict.fromkeys((*KEYS, *(one.name for own in devices() for one in own.all_options)))
+        owners = devices(emulated_names())
+        known = dict.fromkeys((*KEYS, *(one.name for own in owners for one in own.all_options)))
         if marker.args or not set(marker.kwargs) <= set(known):
             raise pytest.UsageError(
                 f"{item.nodeid}: marker {MARKER} takes {', '.join(known)} by name, nothing else"

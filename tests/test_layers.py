@@ -24,7 +24,7 @@ BELOW = {"hdl": TABLES, "firmware_model": (), "emulator": ("hdl", "firmware_mode
 USING = ("cli", "emulation", "experiments", "ground", "native", "studies")
 #: Parts that may import the other packages inside of functions only: listing devices, opening a
 #: real device and printing help load no emulator.
-LAZY = ("api", "devices", "pytest_plugin", "sensors", "targets")
+LAZY = ("api", "devices", "parts", "pytest_plugin", "sensors", "targets")
 
 #: Sub-packages of each package from the ground up; those of one line do not import each other.
 ORDER = {
@@ -59,7 +59,7 @@ ORDER = {
         "conformance experiments ground",
         "cli",
         "studies",
-        "sensors pytest_plugin",
+        "parts sensors pytest_plugin",
         "api",
     ),
 }

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from cubestack.emulator.boards.firmware import Insight
 from cubestack.emulator.boards.gateware import with_gateware
+from cubestack.emulator.boards.pins import Pins
 from cubestack.emulator.bus.i2c import Forwarder, I2cBus, I2cTarget
 from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.faults.injector import Faults
@@ -61,6 +62,7 @@ class SerialLine:
     title: str  # its protocol
     suffix: str  # appended to the pty path of the first line
     uart: Uart  # the device's end
+    place: str = ""  # own path or TCP port; empty: beside the first line's
 
     @property
     def baud(self) -> int:
@@ -88,6 +90,7 @@ class Board(ABC):
         on_close: functions that ``close`` calls first.
         engine: FPGAs and their SRAMs; None on a board without.
         insight: analysis of a user's own firmware; None without one.
+        pins: port pins of the processor, where nothing else is connected to them; else None.
         program: the running firmware program; a reset creates a new one.
     """
 
@@ -99,6 +102,7 @@ class Board(ABC):
 
     engine: RtlEngine | None = None
     insight: Insight | None = None
+    pins: Pins | None = None
     processor: Microcontroller
     program: Program
 
@@ -158,9 +162,9 @@ class Board(ABC):
     def faults(self) -> Faults:
         return Faults(self.sites(), self.seed)
 
-    def serial(self, name: str = "uart") -> DirectSerial:
-        """A host's end of serial line ``name`` in this process; KeyError for an unknown line."""
-        return DirectSerial(self.kernel, self.uarts[name])
+    def serial(self, name: str = "") -> DirectSerial:
+        """A host's end of a serial line, by default the first; KeyError for an unknown name."""
+        return DirectSerial(self.kernel, self.uarts[name] if name else self.uart)
 
     def i2c(self) -> DirectI2c:
         """A host's end of the I2C bus in this process."""
@@ -233,11 +237,12 @@ class Board(ABC):
         name: str = "uart",
         title: str = NODE_PROTOCOL,
         suffix: str = "",
+        place: str = "",
     ) -> Uart:
         """Add a serial line, connected to the handlers that ``link`` returns at each interrupt."""
         deliver, silent = lambda byte: link().uart_byte(byte), lambda: link().uart_silence()
         uart = Uart(self.kernel, baud, deliver, silent, silence_bytes=SILENCE_BYTES)
-        self.lines += (SerialLine(name, title, suffix, uart),)
+        self.lines += (SerialLine(name, title, suffix, uart, place),)
         return uart
 
     def _scramble(self, memory: NDArray[np.uint8]) -> None:

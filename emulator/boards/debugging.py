@@ -74,7 +74,9 @@ def windows(board: DebuggedBoard) -> Mapping[MemoryRegion, Window]:
         for index, memory in enumerate(board.engine.memories.values()):
             start = FPGA_BASE + index * FPGA_STEP
             found[MemoryRegion("ram", start, memory.size)] = ArrayWindow(memory)
-    found[MemoryRegion("rom", CAMERA_BASE, CAMERA_BYTES)] = CameraWindow(board.camera.registers)
+    if board.camera is not None:
+        registers = CameraWindow(board.camera.registers)
+        found[MemoryRegion("rom", CAMERA_BASE, CAMERA_BYTES)] = registers
     return found
 
 

@@ -25,7 +25,7 @@ BY_PIN = 0x100
 
 FRAMING_ERROR = 1
 RATE_SHIFT = 8
-"""Flags of a received character: its error, and the line's bits per second."""
+"""Flags of a received character: its error, and the line's bits per second, 0 for any."""
 
 CLOSE = 0.01
 """Largest relative difference between rates that count as equal."""
@@ -35,6 +35,8 @@ FLOATING = 0xFF
 
 ASKING = OutgoingKind.I2C_START, OutgoingKind.I2C_WRITE, OutgoingKind.I2C_READ
 """Messages of an I2C master that wait for an answer."""
+
+I2C_MASTER = *ASKING, OutgoingKind.I2C_STOP
 
 PARITIES: tuple[Parity, ...] = ("N", "N", "E", "O")
 STOPS = (1.0, 1.0, 1.5, 2.0)
@@ -50,11 +52,15 @@ FRAMES = [
 
 @dataclass(eq=False)
 class SerialWire(UartTap):
-    """The device's end of a serial line, at port pins ``tx`` and ``rx`` (16 * port + bit)."""
+    """The device's end of a serial line, at port pins ``tx`` and ``rx`` (16 * port + bit).
+
+    With ``follows`` the host's end takes the firmware's format, unless the host has set its own.
+    """
 
     processor: FirmwareProcessor
     tx: int
     rx: int
+    follows: bool = False
 
     def connect(self, uart: Uart) -> None:
         self._uart = uart
@@ -78,13 +84,23 @@ class SerialWire(UartTap):
         form = self._frame(one.unit & 0xFF)
         rate = round(form.bits * PS_PER_S / max(1, one.extra))
         form = replace(form, baud=min(max(1, rate), FASTEST_BAUD))
-        for known in (self._uart.host_form, self._nominal):
+        uart = self._uart
+        for known in (uart.host_form, self._nominal):
             if abs(rate - known.baud) < CLOSE * known.baud:
                 form = replace(form, baud=known.baud)
                 break
-        if form != self._uart.form:
-            self._uart.form, self._uart.byte_ps = form, form.character_ps
-        self._uart.send(bytes([one.value & 0xFF]))
+        if form != uart.form:
+            if self._unset:
+                uart.host_form = form
+                ahead_ps = self.processor.look_ahead_ps
+                self.processor.look_ahead_ps = min(ahead_ps, form.character_ps * 9 // 10)
+            uart.form, uart.byte_ps = form, form.character_ps
+        uart.send(bytes([one.value & 0xFF]))
+
+    @property
+    def _unset(self) -> bool:
+        """Whether the host's end has the firmware's format, whatever that is."""
+        return self.follows and self._uart.host_form == self._uart.form
 
     def _frame(self, unit: int) -> LineFormat:
         """Format of a unit's characters from its registers, with a dummy rate."""
@@ -98,7 +114,7 @@ class SerialWire(UartTap):
 
     def _receive(self, byte: int, flags: int) -> None:
         machine, unit = self.processor.machine, BY_PIN | self.rx
-        rate = self._uart.form.baud << RATE_SHIFT
+        rate = 0 if self._unset else self._uart.form.baud << RATE_SHIFT  # 0: not checked
         self.processor.change_inputs(lambda: machine.uart_receive(unit, byte, flags | rate))
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from typing import NamedTuple, Protocol
 
+from cubestack.emulator.boards.pins import FLOATS, Pins
 from cubestack.emulator.camera.common.register_file import RegisterFile
 from cubestack.emulator.faults.injector import Faults
 from cubestack.emulator.iss.insight.fault_report import fault_report
@@ -97,7 +98,7 @@ def _value(machine: Machine, address: int) -> int | None:
 HELP = """time              virtual time, core clock, sleep
 camera            registers of the camera
 power             supply currents
-pins              FPGA pins from and to the processor
+pins              FPGA pins from and to the processor; of a bare part, its driven pins
 regs [WHAT]       a peripheral, UNIT.REGISTER, a variable or an address
 faults            kinds of faults and their targets
 faults inject KIND [TARGET] [PARAMETER=VALUE ...]
@@ -124,10 +125,13 @@ class FirmwareBoard(Protocol):
     def engine(self) -> RtlEngine | None: ...
 
     @property
+    def pins(self) -> Pins | None: ...
+
+    @property
     def faults(self) -> Faults: ...
 
     @property
-    def camera(self) -> Camera: ...
+    def camera(self) -> Camera | None: ...
 
 
 class Monitor:
@@ -165,7 +169,10 @@ class Monitor:
         )
 
     def _camera(self, _words: list[str]) -> str:
-        values = self._board.camera.registers.written()
+        camera = self._board.camera
+        if camera is None:
+            return "no camera"
+        values = camera.registers.written()
         return "\n".join(f"{name:24} {value:#06x}" for name, value in values.items())
 
     def _power(self, _words: list[str]) -> str:
@@ -177,7 +184,11 @@ class Monitor:
         return "\n".join(lines)
 
     def _pins(self, _words: list[str]) -> str:
-        engine = self._board.engine
+        engine, pins = self._board.engine, self._board.pins
+        if pins is not None:
+            return "\n".join(
+                f"{pin} {pins.driven(pin)}" for pin in pins if pins.driven(pin) != FLOATS
+            )
         if engine is None:
             return "no FPGA"
         names = (*engine.wiring.mcu_pins, *engine.wiring.output_pins)

@@ -1,7 +1,7 @@
 """Options of commands that run an emulated device or open a target."""
 
 import argparse
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,7 +16,7 @@ from cubestack.host.devices.device import (
     BoardOption,
     engine_name,
 )
-from cubestack.host.devices.registry import device_names, devices
+from cubestack.host.devices.registry import device_names, devices, emulated_names
 from cubestack.host.emulation.emulated import AnyEmulated, check_options
 from cubestack.host.emulation.records import (
     InsightFiles,
@@ -66,12 +66,21 @@ def _engine(text: str) -> str:
         raise argparse.ArgumentTypeError(str(error)) from None
 
 
-def add_board_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options that one device's board alone has, of all registered devices."""
-    for device in devices():
+def add_board_arguments(
+    parser: argparse.ArgumentParser, names: Iterable[str] | None = None, *, serving: bool = False
+) -> None:
+    """Declare the options of single devices' boards; of one that several have, the first's.
+
+    ``names`` as for ``devices``; ``serving``: also those that lead lines to ports.
+    """
+    found: dict[str, tuple[BoardOption, list[str]]] = {}
+    for device in devices(names):
         for option in device.options:
-            if option.name not in {common.name for common in GATEWARE_OPTIONS}:
-                add_option(parser, option, f"{device.name}: ")
+            common = option.name in {one.name for one in GATEWARE_OPTIONS}
+            if not common and (serving or not option.serves):
+                found.setdefault(option.name, (option, []))[1].append(device.name)
+    for option, owners in found.values():
+        add_option(parser, option, f"{', '.join(owners)}: ")
     for option in (*GATEWARE_OPTIONS, *PROFILE_OPTIONS):
         add_option(parser, option)
 
@@ -94,7 +103,7 @@ def options_of_others(device: AnyDevice) -> dict[str, list[str]]:
     """Flags of boards that ``device`` does not have, and the names of the devices that do."""
     own = {option.name for option in device.all_options}
     found: dict[str, list[str]] = {}
-    for other in devices():
+    for other in devices(emulated_names()):
         for option in other.all_options:
             if option.name not in own:
                 found.setdefault(option.flag, []).append(other.name)
@@ -103,7 +112,8 @@ def options_of_others(device: AnyDevice) -> dict[str, list[str]]:
 
 def given_options(args: argparse.Namespace) -> dict[str, Any]:
     """The board options that were given, whichever device has them."""
-    names = dict.fromkeys(option.name for device in devices() for option in device.all_options)
+    known = devices(emulated_names())
+    names = dict.fromkeys(option.name for device in known for option in device.all_options)
     return {name: value for name in names if (value := getattr(args, name, None)) is not None}
 
 

@@ -38,7 +38,7 @@ from cubestack.host.cli.arguments import add_path, add_value
 from cubestack.host.cli.ports import LAST_PORT, add_port_arguments, check_linux, open_ports
 from cubestack.host.cli.program import exit_status, read_console
 from cubestack.host.devices.i2c_targets import i2c_targets
-from cubestack.host.devices.registry import device, device_names, devices
+from cubestack.host.devices.registry import device, devices, emulated_names
 from cubestack.host.emulation.emulated import AnyEmulated, power_up
 from cubestack.host.emulation.history import History
 from cubestack.host.emulation.orbit import follow
@@ -65,9 +65,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "devices",
         nargs="+",
-        choices=device_names(),
+        choices=emulated_names(),
         metavar="device",
-        help=", ".join(device_names()),
+        help=", ".join(emulated_names()),
     )
     add_path(parser, "--scene", f"TOML scene of the one device; default: {', or '.join(scenes)}")
     add_path(
@@ -81,7 +81,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_value(parser, "baud", whole(None, "of the node protocol; default 57600", 1))
     device_options.add_start_arguments(parser)
-    device_options.add_board_arguments(parser)
+    device_options.add_board_arguments(parser, emulated_names(), serving=True)
     parser.add_argument(
         "--pace",
         choices=("real", "fast"),

@@ -20,7 +20,7 @@ from collections.abc import Callable
 from cubestack.firmware_model.interface.codec.message import Interface
 from cubestack.firmware_model.interface.efm32gg.table import Processor
 from cubestack.host.cli.arguments import add_path
-from cubestack.host.devices.registry import device, device_names
+from cubestack.host.devices.registry import device, emulated_names
 from cubestack.host.export.c_header import c_header
 from cubestack.host.export.cosmos import cosmos
 from cubestack.host.export.processor import processor_header, svd
@@ -42,7 +42,9 @@ OF_PROCESSOR: dict[str, Callable[[Processor], str]] = {"processor-c": processor_
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("device", choices=device_names(), help="device whose interface is written")
+    parser.add_argument(
+        "device", choices=emulated_names(), help="device whose interface is written"
+    )
     parser.add_argument("--format", choices=(*OF_INTERFACE, *OF_PROCESSOR), required=True)
     add_path(parser, "--out", "default: standard output")
 
@@ -50,6 +52,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     found = device(args.device)
     if args.format in OF_INTERFACE:
+        if not found.interface.messages:
+            raise ValueError(f"{found.name} has no messages; choose {' or '.join(OF_PROCESSOR)}")
         text = OF_INTERFACE[args.format](found.interface)
     elif found.processor is None:
         raise ValueError(f"the processor of {found.name} runs no firmware of your own")

@@ -4,6 +4,7 @@ import argparse
 import sys
 from collections.abc import Sequence
 from contextlib import ExitStack
+from itertools import count
 from pathlib import Path
 
 from cubestack.emulator.boards.contract import SerialLine
@@ -86,19 +87,26 @@ def open_ports(
     first = args.tcp if args.rfc2217 is None else args.rfc2217
     lines = [(opened, line) for opened in devices for line in opened.board.lines]
     served: list[tuple[AnyEmulated, SerialLine, SerialPort]] = []
-    for index, (opened, line) in enumerate(lines):
+    numbers = count()
+    for opened, line in lines:
         endpoint: SerialPort
-        if first is None:
+        if line.place.isdecimal():
+            port = whole(None, "", 0, LAST_PORT).parse(line.place)
+            endpoint = TcpEndpoint(args.listen, port, line.uart, allow_remote=args.allow_remote)
+        elif line.place:
+            path = Path(line.place)
+            endpoint = PtyEndpoint(path, line.uart, strict=args.strict_line, report=say)
+        elif first is None:
             name = opened.device.title.upper()
             path = args.pty or Path(f"tty{name}")
             if args.pty is not None and len(devices) > 1:
                 path = path.with_name(path.name + name)
             path = path.with_name(path.name + line.suffix)
             endpoint = PtyEndpoint(path, line.uart, strict=args.strict_line, report=say)
-        elif first and first + len(lines) - 1 > LAST_PORT:
-            raise ValueError(f"{opened.device.title} needs {len(lines)} ports, {first} and up")
+        elif first and first + (wanted := sum(not one.place for _, one in lines)) - 1 > LAST_PORT:
+            raise ValueError(f"{opened.device.title} needs {wanted} ports, {first} and up")
         else:
-            port = first and first + index  # 0 lets the system choose each one
+            port = first and first + next(numbers)  # 0 lets the system choose each one
             endpoint = kind(args.listen, port, line.uart, allow_remote=args.allow_remote)
         stack.callback(endpoint.close)
         served.append((opened, line, endpoint))

@@ -11,13 +11,13 @@ examples:
 import argparse
 
 from cubestack.host.cli.arguments import add_flag
-from cubestack.host.devices.registry import device, device_names
+from cubestack.host.devices.registry import device, emulated_names
 from cubestack.host.export.interface import FORMATS, render, render_switches
 from cubestack.host.export.processor import render_processor
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("device", choices=device_names(), help="device whose interface is listed")
+    parser.add_argument("device", choices=emulated_names(), help="device whose interface is listed")
     parser.add_argument("--format", choices=tuple(FORMATS), default="table", help="default: table")
     add_flag(
         parser,
@@ -35,6 +35,8 @@ def run(args: argparse.Namespace) -> int:
         print(render_processor(found.processor(), args.format), end="")
     elif args.switches:
         print(render_switches(found.title, found.switches, args.format), end="")
+    elif not found.interface.messages:
+        raise ValueError(f"{found.name} has no messages; add --processor")
     else:
         print(render(found.interface, args.format), end="")
     return 0

@@ -70,6 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--serial",
+        dest="on_serial",
         action="append",
         choices=device_names(),
         help="device on serial lines instead of I2C; repeatable. {port} is the first one's "
@@ -114,7 +115,7 @@ def run(args: argparse.Namespace) -> int:
     if shutil.which(args.program[0]) is None:
         raise ValueError(f"{args.program[0]}: no such program; give a path, or a name on the PATH")
     with ExitStack() as stack:
-        if args.serial:
+        if args.on_serial:
             return _run_on_serial_lines(args, stack)
         if args.strict_line:
             raise ValueError("--strict-line goes with --serial")
@@ -144,7 +145,7 @@ def _run_on_serial_lines(args: argparse.Namespace, stack: ExitStack) -> int:
         if getattr(args, name) not in (None, []):
             raise ValueError(f"{option_string(name)} is for I2C: leave it out with --serial")
     report = (lambda _text: None) if args.quiet else say
-    opened = _power_up(args.serial, args, stack)
+    opened = _power_up(args.on_serial, args, stack)
     kernel = opened[0].board.kernel
     folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="cubestack-"))
     terminals = Terminals(opened, Path(folder), stack, strict=args.strict_line, report=say)

@@ -86,6 +86,7 @@ class BoardOption(Declaration):
         known: texts that have a meaning of their own.
         unset: what it means when it is empty, a word or two for lists.
         repeats: whether the command line joins several by commas.
+        serves: whether it leads a line to a port, so only commands that serve ports have it.
     """
 
     name: str
@@ -97,6 +98,7 @@ class BoardOption(Declaration):
     known: tuple[str, ...] = ()
     unset: str = ""
     repeats: bool = False
+    serves: bool = False
 
     def __post_init__(self) -> None:
         kind = ValueKind("file", "a file", _file, str) if self.is_file else TEXT

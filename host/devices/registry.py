@@ -1,11 +1,14 @@
 """All registered devices by name: built-in ones and those of other distributions.
 
+A *part* is a microcontroller without a sensor around it: it can be emulated with a user's own
+firmware, but has no messages, so commands that speak a device's protocol do not list it.
+
 Another distribution registers a device by an entry point in the group ``cubestack.devices``: its
 name is the device's, its value leads to a ``Device``. Texts ``"package.module:name"`` name what is
 imported on first use.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from functools import cache, partial
 from importlib.metadata import EntryPoint, entry_points
@@ -47,6 +50,9 @@ GROUP = "cubestack.devices"
 #: Built-in devices, in the order of all lists.
 BUILT_IN = ("cubestar", "cubesense", "aramis")
 
+#: Built-in parts.
+PARTS = ("efm32gg",)
+
 
 @cache
 def _entries() -> dict[str, EntryPoint]:
@@ -59,24 +65,34 @@ def _entries() -> dict[str, EntryPoint]:
     return entries
 
 
+@cache
+def _parts() -> dict[str, EntryPoint]:
+    return {name: EntryPoint(name, f"cubestack.host.parts.{name}:DEVICE", GROUP) for name in PARTS}
+
+
 def device_names() -> tuple[str, ...]:
-    """Names of all registered devices; loads none of them."""
+    """Names of all registered sensors; loads none of them."""
     return tuple(_entries())
+
+
+def emulated_names() -> tuple[str, ...]:
+    """Names of all that can be emulated: sensors, then parts."""
+    return (*_entries(), *_parts())
 
 
 @cache
 def device(name: str) -> AnyDevice:
-    """The device of this name in any case; raises TargetError if unknown or not loadable."""
-    entry = _entries().get(name.lower())
+    """The sensor or part of this name in any case; TargetError if unknown or not loadable."""
+    entry = {**_parts(), **_entries()}.get(name.lower())
     if entry is None:
-        raise TargetError(f"no device {name!r}; known: {', '.join(device_names())}")
+        raise TargetError(f"no device {name!r}; known: {', '.join(emulated_names())}")
     try:
         found = load(entry.value)
         if not isinstance(found, Device) or found.name != entry.name:
             raise TargetError(f"{entry.value} is no Device of that name")
     except TargetError as error:
         raise TargetError(f"device {name}: {error}") from error
-    if entry.name not in BUILT_IN:
+    if entry.name not in (*BUILT_IN, *PARTS):
         _check(found, entry.value)
     return found
 
@@ -89,9 +105,9 @@ def _check(found: AnyDevice, place: str) -> None:
         raise TargetError(f"device {found.name}: {place}: {error}") from None
 
 
-def devices() -> Iterator[AnyDevice]:
-    """All registered devices that load; ``device`` reports why another one doesn't."""
-    for name in device_names():
+def devices(names: Iterable[str] | None = None) -> Iterator[AnyDevice]:
+    """Those of ``names`` that load, by default all sensors; ``device`` reports why not."""
+    for name in device_names() if names is None else names:
         try:
             yield device(name)
         except TargetError:

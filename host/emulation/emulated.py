@@ -28,7 +28,7 @@ from cubestack.host.clients.i2c import I2cClient
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.devices.device import AnyDevice, BoardT_co, ClientT_co, Device, Engine
 from cubestack.host.devices.registry import device as registered
-from cubestack.host.devices.registry import devices
+from cubestack.host.devices.registry import devices, emulated_names
 from cubestack.host.emulation.virtual_serial import PS_PER_S, VirtualSerial
 from cubestack.host.terminal import busy
 from cubestack.host.transport.smbus import CubeSMBus
@@ -95,12 +95,15 @@ class EmulatedDevice(Closable, Generic[BoardT_co, ClientT_co]):
 
     # --- ports ----------------------------------------------------------------------------------
 
-    def serial(self, timeout: float | None = 1.0, line: str = "uart") -> VirtualSerial:
-        """A serial line with pyserial's interface; ``timeout`` in s of virtual time."""
-        if line == self.board.lines[0].name:
+    def serial(self, timeout: float | None = 1.0, line: str = "") -> VirtualSerial:
+        """A serial line, by default the first; it has pyserial's interface.
+
+        ``timeout`` is in s of virtual time. Raises KeyError for an unknown line.
+        """
+        name = line or self.board.lines[0].name
+        if name == self.board.lines[0].name:
             self._client = None
-        port = self.board.serial(line)
-        return VirtualSerial(port, self.board.uarts[line].form.baud, timeout)
+        return VirtualSerial(self.board.serial(name), self.board.uarts[name].form.baud, timeout)
 
     def smbus(self) -> CubeSMBus:
         """The I2C bus with smbus2's interface."""
@@ -221,7 +224,10 @@ def check_options(
     for name, value in options.items():
         if name not in own:
             owners = [
-                one.name for one in devices() for option in one.all_options if option.name == name
+                one.name
+                for one in devices(emulated_names())
+                for option in one.all_options
+                if option.name == name
             ]
             whose = f"an option of {', '.join(owners)}, not" if owners else "no option"
             raise ValueError(f"{shown(name)} is {whose} of {device.name}")
@@ -294,7 +300,7 @@ def open_device(
     """Power up a registered device.
 
     Args:
-        name: of the device, one of ``device_names()``.
+        name: of the device or part, one of ``emulated_names()``.
         scene: what its cameras see: a scene, the path of a scene file, or None for the default.
         seed: of everything random.
         engine: how its FPGA is run.

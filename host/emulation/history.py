@@ -54,7 +54,7 @@ class Recipe:
             scene = found.scene(path)
         faults = setup.faults
         plan = None if faults is None else parse_plan(faults.text, faults.name)
-        return cls(found, scene, plan, setup, recording.bauds.get("uart"), options)
+        return cls(found, scene, plan, setup, next(iter(recording.bauds.values()), None), options)
 
     def make(self, engine: Engine, **more: Any) -> AnyEmulated:
         """Power it up with its fault plan; ``more`` are keywords of ``power_up``."""

@@ -70,7 +70,9 @@ def experiment_of(device: AnyDevice, command: str = MEASURE) -> AnyExperiment:
 
 def board_options(device: AnyDevice, experiment: AnyExperiment) -> Mapping[str, BoardOption]:
     options = device.all_options if experiment.powers_up else ()
-    return {one.name: one for one in options if one.name not in experiment.decides}
+    return {
+        one.name: one for one in options if one.name not in experiment.decides and not one.serves
+    }
 
 
 def board_as_said(device: AnyDevice, options: Options, given: Mapping[str, Any]) -> dict[str, Any]:

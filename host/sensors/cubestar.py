@@ -9,7 +9,8 @@ from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES, INTERFACE
 from cubestack.firmware_model.interface.cubestar.pins import Layout
 from cubestack.firmware_model.interface.cubestar.switches import DEFAULT_SWITCHES, CubeStarSwitches
 from cubestack.host.conformance import effects
-from cubestack.host.devices.device import FILE, BoardOption, ConformanceNotes, Device, Report
+from cubestack.host.devices.device import BoardOption, ConformanceNotes, Device, Report
+from cubestack.host.devices.own_firmware import FIRMWARE_OPTIONS, OwnFirmware, firmware_option
 from cubestack.host.devices.registry import call, get
 
 if TYPE_CHECKING:
@@ -38,70 +39,43 @@ def _open_board(
     *,
     baud: int | None = None,
     layout: str = Layout.COPIED.value,
-    firmware: str = "",
-    firmware_base: str = "",
-    semihosting: bool = False,
-    semihosting_root: str = "",
     **common: Any,
 ) -> "CubeStarStack":
-    if firmware:
-        root = Path(semihosting_root) if semihosting_root else None
-        if root is not None and not root.is_dir():
-            raise ValueError(f"semihosting root {semihosting_root!r} is not a folder; create it")
-        common["base"] = _address(firmware_base) if firmware_base else None
-        board = _open_with(firmware, scene, baud or INTERFACE.baud, Layout(layout), **common)
-        if semihosting or root is not None:
-            board.enable_semihosting(root)
-        return board
-    if semihosting or semihosting_root:
-        raise ValueError("semihosting needs own firmware; choose an image with firmware")
-    if firmware_base:
-        raise ValueError("a firmware base needs own firmware; choose an image with firmware")
+    own = OwnFirmware.of(common)
+    rate, chosen = baud or INTERFACE.baud, Layout(layout)
+    if own.firmware:
+        return _open_with(own, scene, baud=rate, layout=chosen, **common)
+    own.check_unused()
     from cubestack.emulator.boards.cubestar.board import CubeStarBoard
     from cubestack.emulator.boards.cubestar.catalogue import onboard_catalogue
 
     return CubeStarBoard(
-        scene,
-        onboard_catalogue(pair_limit_deg=WIDEST_PAIR_DEG),
-        baud=baud or INTERFACE.baud,
-        layout=Layout(layout),
-        **common,
+        scene, onboard_catalogue(pair_limit_deg=WIDEST_PAIR_DEG), baud=rate, layout=chosen, **common
     )
 
 
-def _address(text: str) -> int:
-    try:
-        return int(text, 0)
-    except ValueError:
-        raise ValueError(f"firmware base {text!r} is no address, such as 0x0") from None
-
-
 def _open_with(
-    firmware: str,
+    own: OwnFirmware,
     scene: "Scene | SkyView",
-    baud: int,
-    layout: Layout,
     *,
-    base: int | None = None,
     switches: CubeStarSwitches = DEFAULT_SWITCHES,
     **common: Any,
 ) -> "CubeStarFirmwareBoard":
     """A board that runs an image; raises ValueError for options of the Python program."""
     from cubestack.emulator.boards.cubestar.firmware import CubeStarFirmwareBoard
-    from cubestack.emulator.iss.image import load_image
 
     if switches != DEFAULT_SWITCHES:
         raise ValueError("own firmware has no profile and no switches; leave them out")
-    name, mark, wanted = firmware.partition("#")
-    if name == REFERENCE:
-        from cubestack.firmware_model.reference.image import reference_image
+    common["serial"] = own.serial
+    return own.power_up(lambda image: CubeStarFirmwareBoard(scene, image, **common), _shipped)
 
-        image = load_image(f"{reference_image()}{mark}{wanted}")
-    else:
-        image = load_image(firmware, base=base)
-    board = CubeStarFirmwareBoard(scene, image, baud=baud, layout=layout, **common)
-    board.firmware = name + image.mark
-    return board
+
+def _shipped(name: str) -> Path | None:
+    if name != REFERENCE:
+        return None
+    from cubestack.firmware_model.reference.image import reference_image
+
+    return reference_image()
 
 
 def _load_scene(path: Path) -> "SkyView":
@@ -190,35 +164,12 @@ DEVICE: "Device[CubeStarStack, CubeStar]" = Device(
             default=Layout.COPIED.value,
             notice=_layout_notice,
         ),
-        BoardOption(
-            "firmware",
-            "program for the processor: an ELF, Intel HEX, S-record or UF2 file, raw bytes, "
-            f"or {REFERENCE}, the same in C, instead of this project's own "
-            "(docs/how-to/own-firmware.md)",
-            default="",
-            metavar=FILE,
+        firmware_option(
+            f"or {REFERENCE}, the same in C, instead of this project's own",
             known=(REFERENCE,),
             unset="this project's model",
         ),
-        BoardOption(
-            "firmware_base",
-            "address of the first byte of --firmware, which is raw bytes",
-            default="",
-            metavar="ADDRESS",
-            unset="not raw bytes",
-        ),
-        BoardOption(
-            "semihosting",
-            "handle semihosting calls (BKPT 0xAB) of --firmware; without it they are faults",
-        ),
-        BoardOption(
-            "semihosting_root",
-            "folder with the files that semihosting may open, in it and nowhere else; without it "
-            "all are refused",
-            default="",
-            metavar="FOLDER",
-            unset="no files",
-        ),
+        *FIRMWARE_OPTIONS,
     ),
     processor=get("cubestack.firmware_model.interface.cubestar.processor_pins:PROCESSOR"),
     tops=get("cubestack.hdl.cubestar.tops:TOPS"),

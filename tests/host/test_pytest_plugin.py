@@ -9,7 +9,7 @@ import pytest
 
 from cubestack.emulator.native.compiler import find_compiler
 from cubestack.firmware_model.interface.codec.switches import DEFAULT_PROFILE
-from cubestack.host.devices.registry import device_names
+from cubestack.host.devices.registry import emulated_names
 from cubestack.host.pytest_plugin import KEYS
 
 PLUGIN = "cubestack.host.pytest_plugin"
@@ -74,7 +74,7 @@ def test_seed_and_profile_come_from_marker_or_command_line(run: Run) -> None:
 
 TAKES = (
     f"marker cubestack takes {', '.join(KEYS)}, layout, firmware, firmware_base, semihosting, "
-    "semihosting_root, gateware, gateware_param, profile, set"
+    "semihosting_root, serial, gateware, gateware_param, profile, set"
 )
 WRONG_MARKERS = {
     "(3)": TAKES,
@@ -101,7 +101,7 @@ def test_rejects_invalid_markers(run: Run) -> None:
 
 def test_every_registered_device_has_a_fixture(run: Run) -> None:
     done = run("", "--fixtures", "-v")
-    for name in device_names():
+    for name in emulated_names():
         assert f"\n{name} -- " in done.stdout
 
 

@@ -3,8 +3,6 @@
 EFM32GG280 data sheet, table of alternate functionality; a ROUTE register's LOCATION selects one.
 """
 
-import re
-
 #: Each row is a signal and its pins, location 0 first.
 _TABLE = """
     USART0_TX     PE10 PE7  PC11 PE13 PB7  PC0
@@ -65,12 +63,15 @@ _TABLE = """
 LOCATIONS = 8  #: range of a LOCATION field; no signal has as many pins
 
 
+#: Names of all pins by number, port times 16 plus bit: ``PE10`` is 74.
+PINS = tuple(f"P{port}{bit}" for port in "ABCDEF" for bit in range(16))
+
+
 def pin_number(name: str) -> int:
-    """Port times 16 plus bit: ``PE10`` is 74. Raises ValueError for other names."""
-    match = re.fullmatch(r"P([A-F])(\d|1[0-5])", name)
-    if not match:
+    """The index of a name in ``PINS``; ValueError for other names."""
+    if name not in PINS:
         raise ValueError(f"{name!r} is no pin, as PA0 or PE10 are")
-    return (ord(match[1]) - ord("A")) * 16 + int(match[2])
+    return PINS.index(name)
 
 
 #: Pins of each signal by location, as ``port * 16 + bit``.

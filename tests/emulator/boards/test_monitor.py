@@ -15,7 +15,7 @@ from cubestack.firmware_model.interface.efm32gg import LAYOUTS
 
 
 def monitor(engine: object) -> Monitor:
-    board: Any = SimpleNamespace(engine=engine)
+    board: Any = SimpleNamespace(engine=engine, pins=None)
     return Monitor(board, Symbols(None))
 
 

@@ -1,0 +1,1 @@
+"""The EFM32GG280F1024 alone, without a board around it."""

@@ -1,0 +1,1 @@
+"""The declarations of the shipped parts: microcontrollers without a sensor around them."""
