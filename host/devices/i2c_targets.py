@@ -15,6 +15,8 @@ def i2c_targets(
     now = dict(moves)
     found = []
     for one in devices:
+        if not one.interface.messages:
+            continue  # a part, which has no address of its own
         found.append((one.name, one.interface.i2c_address))
         if one.interface.registers is not None:
             found.append((f"{one.name}-registers", one.interface.registers.i2c_address))
