@@ -163,7 +163,6 @@ def _open_emulated(
             setup = emulated_setup(seed, scene, options=options)
             recorder = start_recorder(emulated, create_file(record, stack), setup)
             stack.callback(recorder.close)
-            controls.on_act = lambda words, said: recorder.control(board.kernel.now, words, said)
         lines = [board.serial(line.name) for line in board.lines]
         bus = board.i2c()
         has_node = board.lines[0].has_node

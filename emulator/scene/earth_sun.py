@@ -1,12 +1,13 @@
 """Surroundings of sun and nadir cameras: the Earth below, the Sun, the Moon, and false lights.
 
-CubeSense thesis, sections 5.1.3.2 and 5.5. Directions are unit vectors in *scene axes*, which are
-the satellite's body axes at time 0. The mounting of a camera gives the directions of its boresight
-and of its picture's right side in body axes. Alpha and beta are as in ``emulator.scene.attitude``.
+CubeSense thesis, sections 5.1.3.2 and 5.5. Directions are unit vectors in *scene axes*. These are
+the satellite's body axes at time 0, or the inertial axes once `pointed` is used. The mounting of a
+camera gives the directions of its boresight and of its picture's right side in body axes. Alpha and
+beta are as in ``emulator.scene.attitude``.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import Any
 
@@ -23,6 +24,7 @@ from cubestack.emulator.scene.earth import EARTH_RADIUS_KM, Earth, angular_radiu
 from cubestack.emulator.scene.file import SceneError
 from cubestack.emulator.scene.hazards.contract import SkyHazard, check_hazards
 from cubestack.emulator.scene.hazards.earth_below import Clouds, EarthHazard
+from cubestack.emulator.scene.pointing import HIGHEST_KM, Pointing, Poses, pose_at, turn
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.values import (
     REQUIRED,
@@ -36,9 +38,6 @@ from cubestack.firmware_model.values import (
 
 FASTEST_DEG_S = 1000.0
 """Largest body rate about one axis (assumed)."""
-
-HIGHEST_KM = 1e6
-"""Largest altitude (assumed): there the Earth is half a pixel wide."""
 
 _IDENTITY = (0.0, 0.0, 0.0, 1.0)
 
@@ -144,6 +143,7 @@ class EarthSunScene(DeclaredValues):
     glow_km: float = number(
         10.0, "scale height of the glow above the limb; 0 for none (assumed)", 0, 1000
     )
+    poses: Poses = ()  # attitudes, scene axes to body axes, each valid from its time on
     reflections: tuple[Reflection, ...] = ()  # false lights
     hazards: tuple[SkyHazard, ...] = ()  # other sources of light; some also place Earth and Sun
     seed: int = whole(0, "of the Earth's surface", 0)
@@ -190,8 +190,38 @@ class EarthSunScene(DeclaredValues):
     def axes(self, camera: CameraTarget, time_ps: int) -> NDArray[np.float64]:
         """Rotation (3, 3) from scene axes to a camera's axes at a time."""
         mounting = self.sun_camera if camera == CameraTarget.SUN else self.nadir_camera
-        turned = propagate(_IDENTITY, self.rate_deg_s, time_ps / PS_PER_S)
-        return mounting.matrix @ matrix_from_quaternion(turned)
+        return mounting.matrix @ self._body(time_ps)
+
+    def _body(self, time_ps: int) -> NDArray[np.float64]:
+        """Rotation (3, 3) from scene axes to body axes at a time."""
+        time_s, pose = time_ps / PS_PER_S, pose_at(self.poses, time_ps)
+        turned = propagate(_IDENTITY, self.rate_deg_s, time_s) if pose is None else pose.at(time_s)
+        return matrix_from_quaternion(turned)
+
+    @property
+    def moves(self) -> bool:
+        """Whether the cameras do not see the same at all times."""
+        return bool(self.poses) or bool(np.any(np.asarray(self.rate_deg_s)))
+
+    def pointed(self, pointing: Pointing, at_s: float) -> "EarthSunScene":
+        """The same surroundings of a satellite that is pointed anew at ``at_s``.
+
+        Scene axes become the inertial axes of ``pointing``; the directions that it does not give
+        stay as they are.
+        """
+        bodies = {name: getattr(pointing, name) for name in ("nadir", "sun", "moon", "altitude_km")}
+        given = {name: one for name, one in bodies.items() if one is not None}
+        return replace(self, poses=turn(self.poses, pointing.pose(at_s)), **given)
+
+    def in_body_axes(self) -> "EarthSunScene":
+        """The surroundings from the latest pose on, without `poses`: as a scene file has them."""
+        if not self.poses:
+            return self
+        latest = self.poses[-1]
+        back = matrix_from_quaternion(latest.at(0.0))
+        places = {name: getattr(self, name) for name in ("nadir", "sun", "moon")}
+        turned = {name: back @ one for name, one in places.items() if one is not None}
+        return replace(self, poses=(), rate_deg_s=latest.rate_deg_s, **turned)
 
     def in_camera_axes(
         self, direction: ArrayLike, camera: CameraTarget, time_ps: int

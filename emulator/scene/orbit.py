@@ -23,16 +23,14 @@ from cubestack.emulator.scene.attitude import (
     propagate,
     quaternion_from_matrix,
 )
-from cubestack.emulator.scene.earth import EARTH_RADIUS_KM, angular_radius_deg
+from cubestack.emulator.scene.bodies import DISTURBING, Bodies
+from cubestack.emulator.scene.earth import EARTH_RADIUS_KM
 from cubestack.emulator.scene.earth_sun import EarthSunScene, Mounting
 from cubestack.emulator.scene.file import SceneError
-from cubestack.emulator.scene.hazards import SKY_HAZARDS
-from cubestack.emulator.scene.hazards.contract import SkyHazard
 from cubestack.emulator.scene.hazards.ephemeris import AU_KM, J2000, OBLIQUITY_RAD, heliocentric
 from cubestack.emulator.scene.sky import Pose, SkyScene
 from cubestack.firmware_model.values import DeclaredValues, vector
 
-SUN_RADIUS_KM = 696_000.0
 GM_KM3_S2 = 398_600.8
 """Gravitational parameter of the Earth in WGS 72, the system of two-line elements."""
 
@@ -75,26 +73,19 @@ class Surroundings:
         return -self.position_km / np.linalg.norm(self.position_km)
 
     @property
+    def bodies(self) -> Bodies:
+        return Bodies(
+            nadir=self.nadir,
+            sun=self.sun,
+            moon=self.moon,
+            altitude_km=self.altitude_km,
+            sun_km=self.sun_km,
+        )
+
+    @property
     def shadow(self) -> float:
         """Share of the Sun's disc that the Earth's disc hides, 0 to 1."""
-        earth = np.radians(angular_radius_deg(self.altitude_km))
-        sun = np.arcsin(SUN_RADIUS_KM / self.sun_km)
-        apart = np.arccos(np.clip(self.sun @ self.nadir, -1, 1))
-        return hidden_share(float(sun), float(earth), float(apart))
-
-
-def hidden_share(radius: float, other: float, apart: float) -> float:
-    """Share of a disc that another, not smaller one hides; all angles in the same unit."""
-    if apart >= radius + other:
-        return 0.0
-    if apart <= other - radius:
-        return 1.0
-    first = (apart**2 + radius**2 - other**2) / (2 * apart)  # to the common chord
-    second = apart - first
-    area = radius**2 * np.arccos(np.clip(first / radius, -1, 1))
-    area += other**2 * np.arccos(np.clip(second / other, -1, 1))
-    area -= apart * np.sqrt(max(radius**2 - first**2, 0.0))
-    return float(area / (np.pi * radius**2))
+        return self.bodies.shadow
 
 
 @dataclass(frozen=True)
@@ -221,14 +212,13 @@ class Orbit:
         mounting = self.mountings.get(name, BODY_Z).matrix
         camera = mounting @ body
         pose = Pose(quaternion_from_matrix(camera), mounting @ rate, time_s)
-        hazards = _nearby_hazards(around, camera[2]) if self.hazards else ()
         others = tuple(one for one in scene.hazards if one.name not in DISTURBING)
         return replace(
             scene,
             quaternion=pose.at(0.0),
             rate_deg_s=pose.rate_deg_s,
             poses=(),
-            hazards=(*others, *hazards),
+            hazards=around.bodies.disturb(others, camera[2]) if self.hazards else others,
         )
 
     def earth_sun_scene(
@@ -254,28 +244,6 @@ class Orbit:
 
 
 BODY_Z = Mounting((0.0, 0.0, 1.0))
-
-DISTURBING = {"earth-limb": 60.0, "moon": 60.0, "sun-glare": 100.0}
-"""Hazards for star trackers, and the angle in deg beyond which they are neglected."""
-
-
-def _nearby_hazards(around: Surroundings, boresight: Vector) -> tuple[SkyHazard, ...]:
-    def away_deg(direction: Vector) -> float:
-        return float(np.degrees(np.arccos(np.clip(boresight @ direction, -1, 1))))
-
-    def triple(vector: Vector) -> tuple[float, ...]:
-        return tuple(vector.tolist())
-
-    limb_deg = away_deg(around.nadir) - angular_radius_deg(around.altitude_km)
-    found: dict[str, dict[str, Any]] = {}
-    if limb_deg < DISTURBING["earth-limb"]:
-        stands = {"nadir": triple(around.nadir), "sun": triple(around.sun)}
-        found["earth-limb"] = {**stands, "altitude_km": around.altitude_km}
-    if away_deg(around.moon) < DISTURBING["moon"]:
-        found["moon"] = {"direction": triple(around.moon), "sun": triple(around.sun)}
-    if around.shadow < 1 and away_deg(around.sun) < DISTURBING["sun-glare"]:
-        found["sun-glare"] = {"direction": triple(around.sun)}
-    return tuple(SKY_HAZARDS[name](**values) for name, values in found.items())
 
 
 def precession(julian_date: float) -> Vector:

@@ -7,21 +7,20 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cubestack.emulator.scene.atmosphere import Atmosphere
-from cubestack.emulator.scene.attitude import propagate, quaternion_from_pointing
+from cubestack.emulator.scene.attitude import (
+    matrix_from_quaternion,
+    propagate,
+    quaternion_from_pointing,
+)
 from cubestack.emulator.scene.file import SceneError
 from cubestack.emulator.scene.hazards.contract import SkyHazard, check_hazards
 from cubestack.emulator.scene.hipparcos import DEFAULT_EPOCH
-from cubestack.emulator.scene.picture import PictureScene, check_quaternion
+from cubestack.emulator.scene.picture import PictureScene
+from cubestack.emulator.scene.pointing import FASTEST_DEG_S, Pointing, Pose, Poses, pose_at, turn
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.values import DeclaredValues, flag, number, vector, whole
 
 __all__ = ["FASTEST_DEG_S", "PictureScene", "Pose", "Scene", "SceneError", "SkyScene"]
-
-FASTEST_DEG_S = 100.0
-"""Largest body rate about one axis (assumed): a star smears over the picture's whole height.
-
-The time to render a frame grows with the rate, to ten seconds at this one.
-"""
 
 EPOCHS = (1800.0, 2200.0)
 """Julian years within which proper motions are straight, as assumed."""
@@ -33,29 +32,6 @@ MOST_FALSE_STARS = 10_000
 
 
 @dataclass(frozen=True, eq=False)
-class Pose(DeclaredValues):
-    """An attitude and a constant body rate, valid from a time on.
-
-    ``quaternion`` (4,), scalar last, inertial to camera, is the attitude at ``at_s``.
-    """
-
-    error = SceneError
-
-    quaternion: ArrayLike
-    rate_deg_s: ArrayLike = vector(
-        3, (0.0, 0.0, 0.0), "body rate about the camera axes", -FASTEST_DEG_S, FASTEST_DEG_S
-    )
-    at_s: float = number(0.0, "virtual time from which the pose is valid", formerly="start_s")
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_quaternion(self.quaternion)
-
-    def at(self, time_s: float) -> NDArray[np.float64]:
-        return propagate(self.quaternion, self.rate_deg_s, time_s - self.at_s)
-
-
-@dataclass(frozen=True, eq=False)
 class SkyScene(DeclaredValues):
     """The night sky."""
 
@@ -64,7 +40,7 @@ class SkyScene(DeclaredValues):
     # attitude (4,) at time 0, scalar last, inertial (ICRS at ``epoch``) to camera
     quaternion: ArrayLike
     rate_deg_s: ArrayLike = (0.0, 0.0, 0.0)  # body rate (3,) in camera axes
-    poses: tuple[Pose, ...] = ()  # later poses, each valid from its time on; in order of time
+    poses: Poses = ()  # later poses, each valid from its time on; in order of time
     epoch: float = number(
         DEFAULT_EPOCH, "Julian year to which proper motion moves the stars", *EPOCHS
     )
@@ -101,7 +77,7 @@ class SkyScene(DeclaredValues):
         return cls(quaternion_from_pointing(ra_deg, dec_deg, roll_deg))
 
     @cached_property
-    def all_poses(self) -> tuple[Pose, ...]:
+    def all_poses(self) -> Poses:
         """The pose at time 0, followed by the later ones."""
         return (Pose(self.quaternion, self.rate_deg_s), *self.poses)
 
@@ -115,12 +91,21 @@ class SkyScene(DeclaredValues):
         )
 
     def pose_at(self, time_ps: int) -> Pose:
-        begun = [pose for pose in self.poses if pose.at_s * PS_PER_S <= time_ps]
-        return begun[-1] if begun else self.all_poses[0]
+        return pose_at(self.poses, time_ps) or self.all_poses[0]
 
     def truth(self, time_ps: int) -> NDArray[np.float64]:
         """The attitude (4,) at a time: scalar last, inertial to camera."""
         return self.pose_at(time_ps).at(time_ps / PS_PER_S)
+
+    def pointed(self, pointing: Pointing, at_s: float) -> "SkyScene":
+        """The same sky from a camera that is pointed anew at ``at_s``.
+
+        Earth, Sun and Moon where they are given and near; other hazards stay.
+        """
+        pose = pointing.pose(at_s)
+        boresight = matrix_from_quaternion(pose.quaternion)[2]
+        hazards = pointing.bodies().disturb(self.hazards, boresight)
+        return replace(self, poses=turn(self.poses, pose), hazards=hazards)
 
     def false_lights(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Places (n, 2) of the lights that are in no catalogue, and their magnitudes (n,).

@@ -60,12 +60,14 @@ if TYPE_CHECKING:
     from cubestack.firmware_model.node.program import Source as Source
 
     "Scene"
+    from cubestack.emulator.scene.attitude import matrix_from_quaternion as matrix_from_quaternion
     from cubestack.emulator.scene.file import SceneError as SceneError
     from cubestack.emulator.scene.form import CameraField as CameraField
     from cubestack.emulator.scene.form import DeclaredScene as DeclaredScene
     from cubestack.emulator.scene.form import SkyMap as SkyMap
     from cubestack.emulator.scene.hazards.contract import SUN_RADIUS_DEG as SUN_RADIUS_DEG
     from cubestack.emulator.scene.hazards.contract import Body as Body
+    from cubestack.emulator.scene.pointing import Pointing as Pointing
     from cubestack.firmware_model.values import Declaration as Declaration
     from cubestack.firmware_model.values import choice as choice
     from cubestack.firmware_model.values import flag as flag

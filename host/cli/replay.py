@@ -50,12 +50,9 @@ def run(args: argparse.Namespace) -> int:
         opened = Recipe.of(recording, setup).make(args.engine)
         stack.callback(opened.close)
         whole = argparse.Namespace(record=args.record, trace=None if span else args.trace)
-        recorder = record(whole, opened, stack, setup)
-        board = opened.board
-        controls = EmulatedControls(opened)
-        if recorder is not None:
-            controls.on_act = lambda words, text: recorder.control(board.kernel.now, words, text)
-        replay = Replay(recording, board.kernel, board.uarts, board.i2c_bus, controls.act)
+        record(whole, opened, stack, setup)
+        board, act = opened.board, EmulatedControls(opened).act
+        replay = Replay(recording, board.kernel, board.uarts, board.i2c_bus, act)
         if span is not None:
             stream = create_file(args.trace, stack)
             board.kernel.advance_to(span[0])

@@ -1,6 +1,6 @@
 """Actions on an emulated device other than by its ports, for shell and replay."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Protocol
 
@@ -30,6 +30,9 @@ class Controls(Protocol):
     def scene(self, path: Path) -> None:
         """Load a scene file; raises ValueError if it is invalid."""
 
+    def point(self, words: list[str]) -> None:
+        """Give it another attitude, from ``NAME=VALUE`` words; raises ValueError if invalid."""
+
     def currents(self) -> dict[str, float]:
         """Supply currents in mA: all, and each channel's."""
 
@@ -53,17 +56,12 @@ def spoken(kinds: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
 
 
 class EmulatedControls:
-    """``Controls`` of a device emulated in this process.
-
-    Attributes:
-        on_act: called after each action with the shell's words and the text of the file they name.
-    """
+    """``Controls`` of a device emulated in this process."""
 
     def __init__(self, emulated: AnyEmulated) -> None:
         from cubestack.emulator.faults.declaration import TIMES
         from cubestack.emulator.faults.table import FAULTS
 
-        self.on_act: Callable[[tuple[str, ...], str], None] = lambda _words, _text: None
         self._emulated = emulated
         board = self._board = emulated.board
         self.channels = tuple(board.power.table.channels)
@@ -85,7 +83,9 @@ class EmulatedControls:
                         self._emulated.scene = path
                     except ValueError as error:
                         raise ValueError(str(error).replace(str(path), name)) from None
-                self.on_act(control.words, control.text)
+                self._emulated.on_act(control.words, control.text)
+            case ("point", *words):
+                self.point(words)
             case ("power", channel, "on" | "off" as state):
                 self.switch(channel, state == "on")
             case _:
@@ -96,7 +96,7 @@ class EmulatedControls:
             self._board.faults.clear()
         else:
             self._board.faults.inject_words(words)
-        self.on_act(("fault", *words), "")
+        self._emulated.on_act(("fault", *words), "")
 
     def fault_log(self) -> list[str]:
         return [str(event) for event in self._board.faults.log]
@@ -106,7 +106,12 @@ class EmulatedControls:
             self._emulated.scene = path
         except FileNotFoundError:
             raise TargetError(f"no scene file {path}") from None
-        self.on_act(("scene", str(path)), read_document(path).text)
+        self._emulated.on_act(("scene", str(path)), read_document(path).text)
+
+    def point(self, words: list[str]) -> None:
+        from cubestack.emulator.scene.pointing import Pointing
+
+        self._emulated.follow(Pointing.parse(words))
 
     def currents(self) -> dict[str, float]:
         power = self._board.power
@@ -118,7 +123,7 @@ class EmulatedControls:
         if channel not in self.channels:
             raise TargetError(f"no channel {channel!r}; known: {', '.join(self.channels)}")
         self._board.power.switch(channel, on)
-        self.on_act(("power", channel, "on" if on else "off"), "")
+        self._emulated.on_act(("power", channel, "on" if on else "off"), "")
 
     def peek(self, what: str) -> dict[str, tuple[int | None, str]]:
         from cubestack.emulator.boards.monitor import peek

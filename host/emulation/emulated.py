@@ -34,9 +34,12 @@ from cubestack.host.terminal import busy
 from cubestack.host.transport.smbus import CubeSMBus
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
     from cubestack.emulator.boards.contract import Board
     from cubestack.emulator.faults.injector import Faults
     from cubestack.emulator.ports.realtime import RealtimeScheduler
+    from cubestack.emulator.scene.pointing import Pointing
 
 
 @dataclass(eq=False)
@@ -49,6 +52,8 @@ class EmulatedDevice(Closable, Generic[BoardT_co, ClientT_co]):
         seed: of everything random.
         chosen: its profile and the switches that differ, as keywords of ``open_device``.
         follows: what moves its scene, e.g. an orbit; empty for a scene that stays as set.
+        on_act: called after each recorded action from outside of the ports, with the shell's words
+            and the text of the file they name.
     """
 
     device: Device[BoardT_co, ClientT_co]
@@ -56,6 +61,9 @@ class EmulatedDevice(Closable, Generic[BoardT_co, ClientT_co]):
     seed: int
     chosen: Mapping[str, str] = field(default_factory=dict)
     follows: str = field(default="", init=False)
+    on_act: Callable[[tuple[str, ...], str], None] = field(
+        default_factory=lambda: lambda _words, _text: None, init=False, repr=False
+    )
     _client: ClientT_co | None = field(default=None, init=False, repr=False)
 
     @property
@@ -92,6 +100,50 @@ class EmulatedDevice(Closable, Generic[BoardT_co, ClientT_co]):
             if value != self.chosen.get(key, ""):
                 raise ValueError(f"{scene}: {key} can only be chosen at power-up")
         self.board.scene = self.device.scene(scene)
+
+    def point(
+        self,
+        quaternion: ArrayLike,
+        rate_deg_s: ArrayLike = (0.0, 0.0, 0.0),
+        *,
+        nadir: ArrayLike | None = None,
+        sun: ArrayLike | None = None,
+        moon: ArrayLike | None = None,
+        altitude_km: float | None = None,
+    ) -> None:
+        """Give it another attitude from the present virtual time on.
+
+        Its axes are the camera axes of a star tracker, and the body axes of a satellite with a sun
+        and a nadir sensor. Inertial axes are those of the stars; for a scene of Earth and Sun, any
+        that the caller keeps to. What is not given stays as it was.
+
+        Args:
+            quaternion: (4,), scalar last, inertial axes to the device's.
+            rate_deg_s: constant body rate (3,) until the next call, in the device's axes.
+            nadir: direction (3,) of the Earth's centre from the satellite, inertial axes.
+            sun: likewise of the Sun.
+            moon: likewise of the Moon.
+            altitude_km: of the satellite.
+
+        Raises:
+            ValueError: a value is invalid, or the scene cannot be pointed: an image file, a
+                device on an orbit, or a sensor whose scene has no `pointed`.
+        """
+        from cubestack.emulator.scene.pointing import Pointing
+
+        directions = {"nadir": nadir, "sun": sun, "moon": moon}
+        self.follow(Pointing(quaternion, rate_deg_s, **directions, altitude_km=altitude_km))
+
+    def follow(self, pointing: Pointing) -> None:
+        """As ``point``, with its arguments in one value."""
+        name, scene = self.device.name, self.board.scene
+        if self.follows:
+            raise ValueError(f"{name} cannot be pointed: {self.follows}")
+        pointed = getattr(scene, "pointed", None)
+        if pointed is None:
+            raise ValueError(f"{name} cannot be pointed: its {type(scene).__name__} has no pointed")
+        self.board.scene = pointed(pointing, self.time_s)
+        self.on_act(("point", *pointing.words()), "")
 
     # --- ports ----------------------------------------------------------------------------------
 

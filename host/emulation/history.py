@@ -111,7 +111,7 @@ class History:
         return bool(self._replays)
 
     def controls(self) -> list[EmulatedControls]:
-        return [self._controls(*one) for one in zip(self.devices, self._kept, strict=True)]
+        return [EmulatedControls(one) for one in self.devices]
 
     def file(self, number: int) -> Path:
         self._kept[number].recorder.flush()
@@ -172,12 +172,6 @@ class History:
             recorder = start_recorder(made, create_file(path, stack), setup)
             stack.callback(recorder.close)
             return _Kept(path, recorder, stack.pop_all())
-
-    def _controls(self, made: AnyEmulated, kept: _Kept) -> EmulatedControls:
-        controls = EmulatedControls(made)
-        kernel, recorder = made.board.kernel, kept.recorder
-        controls.on_act = lambda words, text: recorder.control(kernel.now, words, text)
-        return controls
 
 
 def _replay(

@@ -19,7 +19,9 @@ if TYPE_CHECKING:
 
 
 def start_recorder(emulated: AnyEmulated, stream: IO[str], setup: Setup | None = None) -> Recorder:
-    """Record every byte of all ports; call it before any port opens.
+    """Record every byte of all ports, and actions from outside of them.
+
+    Call it before any port opens.
 
     ``setup`` goes into the header, with the profile.
     """
@@ -30,6 +32,7 @@ def start_recorder(emulated: AnyEmulated, stream: IO[str], setup: Setup | None =
         setup = replace(setup, options={**setup.options, **emulated.chosen})
     recorder = Recorder(stream, emulated.device.name, board.uarts, setup)
     recorder.listen(board.i2c_bus)
+    emulated.on_act = lambda words, text: recorder.control(board.kernel.now, words, text)
     return recorder
 
 

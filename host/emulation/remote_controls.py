@@ -107,6 +107,9 @@ class RemoteControls:
         document = read_document(path)
         self._act("scene", document.name, text=document.text)
 
+    def point(self, words: list[str]) -> None:
+        self._act("point", *words)
+
     def currents(self) -> dict[str, float]:
         return dict(self._state()["devices"][self.device]["currents_ma"])
 

@@ -184,7 +184,7 @@ CALLS = (
         {"mag_limit": (NUMBER, 4.0), "epoch": (NUMBER, 2026.0)},
     ),
     Call(
-        *("POST", "/devices/{device}/act", "the shell's commands fault, scene and power"),
+        *("POST", "/devices/{device}/act", "the shell's commands fault, scene, point, power"),
         _act,
         {"words": (list, REQUIRED), "text": (str, "")},
     ),

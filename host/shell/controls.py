@@ -1,4 +1,4 @@
-"""Shell commands for an emulated device: scene, fault, power, time, peek."""
+"""Shell commands for an emulated device: scene, point, fault, power, time, peek."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +16,7 @@ from cubestack.host.targets import Target
 ON_OFF = ("on", "off")
 
 SCENE = "scene FILE"
+POINT = "point quaternion=X,Y,Z,W [rate_deg_s=X,Y,Z] [nadir|sun|moon=X,Y,Z] [altitude_km=KM]"
 FAULT = "fault [KIND [TARGET] [PARAMETER=VALUE ...] [for_s=SECONDS]]"
 LOG = "log"
 """Argument of ``fault`` that lists the fault events."""
@@ -33,6 +34,7 @@ class ControlCommands:
     def commands(self) -> list[ShellCommand]:
         return [
             ShellCommand(SCENE, "load another scene", self._scene, True),
+            ShellCommand(POINT, "turn the device in its scene", self._point, True),
             ShellCommand(
                 FAULT,
                 "inject a fault; `fault clear` ends all, `fault log` lists events",
@@ -48,6 +50,10 @@ class ControlCommands:
         check_count(SCENE, words, 1, 1)
         self._controls.scene(Path(words[0]))
         return CommandResult([("", f"scene {words[0]}")], {"scene": words[0]})
+
+    def _point(self, words: list[str]) -> CommandResult:
+        self._controls.point(words)
+        return CommandResult([("", f"point: {' '.join(words)}")], {"point": " ".join(words)})
 
     def _fault(self, words: list[str]) -> CommandResult:
         controls = self._controls

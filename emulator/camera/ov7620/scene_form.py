@@ -38,7 +38,7 @@ def earth_sun_form() -> form.SceneForm[EarthSunView]:
 
 
 def _view(board: Any) -> EarthSunView:
-    return View(board.scene, next(iter(board.cameras.values())).condition)
+    return View(board.scene.in_body_axes(), next(iter(board.cameras.values())).condition)
 
 
 def _table(view: EarthSunView) -> form.Table:
@@ -74,7 +74,7 @@ def _reflection(one: Reflection) -> form.Table:
 
 def _sky_map(view: EarthSunView, now_ps: int) -> form.SkyMap:
     scene = view.scene
-    moved = bool(np.any(np.asarray(scene.rate_deg_s))) and now_ps > 0
+    moved = scene.moves and now_ps > 0
     bodies = [
         Body("Earth", np.asarray(scene.nadir), angular_radius_deg(scene.altitude_km)),
         Body("Sun", np.asarray(scene.sun), SUN_RADIUS_DEG),

@@ -268,7 +268,7 @@ class Ov7620(ImageSensor[EarthSunScene, FisheyeCondition]):
         return np.ascontiguousarray(window[:, ::-1] if settings.mirror else window)
 
     def _light_at(self, time_ps: int) -> Light:
-        if not np.any(self.scene.rate_deg_s):
+        if not self.scene.moves:
             time_ps = 0  # the same at all times
         # The light already contains the spot of a lens in focus.
         further = math.sqrt(max(self._basics.spot_px**2 - luminance.SPOT_PX**2, 0))

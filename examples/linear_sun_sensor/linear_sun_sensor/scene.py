@@ -1,6 +1,6 @@
 """What SunSlit sees: the Sun at an angle. Scene files have ``kind = "sun-slit"`` and these keys."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -9,8 +9,11 @@ from cubestack.sensor import (
     Body,
     CameraField,
     DeclaredScene,
+    Pointing,
+    SceneError,
     SkyMap,
     flag,
+    matrix_from_quaternion,
     number,
     whole,
 )
@@ -26,6 +29,14 @@ class SlitScene(DeclaredScene):
     brightness: float = number(1.0, "of the Sun at 1 au", 0, 100)
     noise: bool = flag(True, "whether pixels have any")
     seed: int = whole(0, "of the noise", 0, 2**32)
+
+    def pointed(self, pointing: Pointing, at_s: float) -> "SlitScene":
+        """The Sun at the attitude of ``pointing``, which stays until the next one."""
+        del at_s
+        if pointing.sun is None:
+            raise SceneError("point needs sun, its direction in inertial axes")
+        x, _, z = matrix_from_quaternion(pointing.quaternion) @ np.asarray(pointing.sun)
+        return replace(self, sun_deg=float(np.clip(np.degrees(np.arctan2(x, z)), -90, 90)))
 
     def sky_map(self, now_ps: int) -> SkyMap:
         """Where Sun and field are, on a map of the sky."""

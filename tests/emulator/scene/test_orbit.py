@@ -12,17 +12,16 @@ from cubestack.emulator.scene.attitude import (
     propagate,
     quaternion_from_pointing,
 )
+from cubestack.emulator.scene.bodies import DISTURBING, hidden_share
 from cubestack.emulator.scene.earth_sun import CameraTarget, EarthSunScene, Mounting
 from cubestack.emulator.scene.file import SceneError
 from cubestack.emulator.scene.orbit import (
-    DISTURBING,
     EARTH_RADIUS_KM,
     Inertial,
     NadirPointing,
     Orbit,
     Waypoints,
     circular,
-    hidden_share,
     moon,
     precession,
     rate_between,

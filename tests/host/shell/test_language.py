@@ -197,8 +197,8 @@ def test_shell_completes_every_message_and_field_name(silent_shell):
 @pytest.mark.parametrize(
     ("line", "found"),
     [
-        ("", ["read", "write", "watch", "dump", "list", "image", "bench", "raw", "scene", "fault",
-              "power", "time", "peek", "help"]),
+        ("", ["read", "write", "watch", "dump", "list", "image", "bench", "raw", "scene", "point",
+              "fault", "power", "time", "peek", "help"]),
         ("wa", ["watch"]),
         ("bench ", ["a", "q", "s", "w"]),
         ("fault ", ["latch-up", "camera", "log"]),

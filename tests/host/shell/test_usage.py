@@ -51,9 +51,12 @@ def test_time_advances_and_is_shown(known: Known) -> None:
         known.run("time -1")
 
 
-def test_shell_scene_and_fault_commands_reach_the_controls(known: Known) -> None:
+def test_shell_scene_point_and_fault_commands_reach_the_controls(known: Known) -> None:
     assert known.run("scene a.toml").data == {"scene": "a.toml"}
     known.controls.scene.assert_called_once_with(Path("a.toml"))
+    turned = known.run("point quaternion=0,0,0,1 sun=1,0,0")
+    known.controls.point.assert_called_once_with(["quaternion=0,0,0,1", "sun=1,0,0"])
+    assert turned.data == {"point": "quaternion=0,0,0,1 sun=1,0,0"}
     listed = known.run("fault")
     faults = CONTROLS["faults"]
     assert (listed.rows, listed.data) == ([("", one) for one in faults], {"faults": faults})
