@@ -1,0 +1,1 @@
+"""Exports of an interface for people and programs."""
