@@ -169,7 +169,9 @@ int64_t iss_next_event(const IssMachine *machine) {
 
 // 0: awake, else 1 + energy mode.
 int32_t iss_asleep(const IssMachine *machine) {
-    if (machine->system.sleep() == armv7m::Sleep::Awake) return 0;
+    // The core is awake when a register brings the part to EM4.
+    if (machine->system.sleep() == armv7m::Sleep::Awake)
+        return machine->part && machine->part->mode == 4 ? 5 : 0;
     return machine->part ? 1 + machine->part->mode : 1;
 }
 

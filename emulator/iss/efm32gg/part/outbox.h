@@ -21,7 +21,7 @@ enum class Kind : int32_t {
     SEMIHOSTING,  // a call of the host, which must answer it; unit: operation; value: parameter
     LOG,          // text: something not modelled or used wrongly; each text once
     RESET,        // the part was reset; value: RMU's cause bits; text: an unexpected cause
-    SLEEP,        // value: energy mode 1..4, 0: awake
+    SLEEP,        // value: energy mode 1..4, 0: awake; extra: 1 for EM4 on the backup supply
     FLASH,        // value: address; unit 0: written, extra: bytes; 1: erased, extra: wear or bytes
     SPI,          // a word begins; unit; value: bits; extra: duration in ps
     FAULT,        // the program cannot continue; text

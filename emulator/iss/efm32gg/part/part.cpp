@@ -85,7 +85,8 @@ static constexpr int64_t START_UP = 163 * MICROSECOND;
 
 void Part::perform_reset() {
     reset_cause = std::exchange(wanted_reset, 0);
-    const uint32_t cold = rmu::RSTCAUSE_PORST | rmu::RSTCAUSE_BODUNREGRST | rmu::RSTCAUSE_BODREGRST;
+    const uint32_t cold = rmu::RSTCAUSE_PORST | rmu::RSTCAUSE_BODUNREGRST |
+                          rmu::RSTCAUSE_BODREGRST | rmu::RSTCAUSE_BUMODERST;
     const int64_t time = now();
     each([](Peripheral &one) { one.clocks_changing(); });
     asleep = locked = hung = calling = false;
@@ -93,6 +94,7 @@ void Part::perform_reset() {
     stalled_until = owed_cycles = 0;
     rmu->caused(reset_cause);
     each([](Peripheral &one) { one.reset(); });
+    backup_lost = false;
     standing = false;
     standing_now = time;
     Rates wanted;

@@ -44,6 +44,7 @@ enum Input {
     ACMP0_CH0 = 10,   // to CH7: port C, bits 0 to 7
     ACMP1_CH0 = 18,   // to CH7: port C, bits 8 to 15
     ADC0_REFERENCE = 26,  // at the pin for external references
+    BACKUP_SUPPLY = 27,   // at BU_VIN
     COUNT = 32,
 };
 }  // namespace analog
@@ -137,6 +138,7 @@ public:
     uint32_t reset_cause = 0;            // of the reset in progress
     int mode = 0;                        // energy mode, 0: awake
     void enter_em4();
+    bool backup_lost = false;            // the backup domain had no power; until the next reset
     bool hung = false;                   // injected fault: no instructions until a reset
 
     // -- the bus, also for DMA: false is a bus fault; `wait` grows by the wait states --

@@ -188,7 +188,7 @@ void Part::enter_em4() {
     mode = 4;
     asleep = true;
     change_clocks([this] { cmu->sleep(4); });
-    send(Kind::SLEEP, 0, 4);
+    send(Kind::SLEEP, 0, 4, emu->in_backup());
 }
 
 }  // namespace efm32gg

@@ -1,7 +1,7 @@
 // RTC and BURTC: low-frequency counters that count up to compare values, and the retention
 // registers. EFM32GG Reference Manual, chapters 21 and 22.
 //
-// Not modelled of BURTC: low power mode, time stamps, failure detection of the LFXO.
+// Not modelled of BURTC: low power mode, failure detection of the LFXO.
 #include "efm32gg/clocks/emu.h"
 #include "efm32gg/clocks/rmu.h"
 #include "efm32gg/part/low_energy.h"
@@ -140,11 +140,13 @@ private:
     bool watched(int compare) const override { return letimer.awaits(compare); }
 };
 
-using burtc::CNT, burtc::COMP0, burtc::CTRL_CLKSEL, burtc::CTRL_COMP0TOP, burtc::CTRL_MODE,
-    burtc::CTRL_PRESC, burtc::CTRL_RSTEN, burtc::IF_COMP0, burtc::IF_OF, burtc::LOCK,
-    burtc::POWERDOWN, burtc::POWERDOWN_RAM, burtc::RET0_REG, burtc::RET127_REG;
+using burtc::CMD, burtc::CMD_CLRSTATUS, burtc::CNT, burtc::COMP0, burtc::CTRL_BUMODETSEN,
+    burtc::CTRL_CLKSEL, burtc::CTRL_COMP0TOP, burtc::CTRL_MODE, burtc::CTRL_PRESC,
+    burtc::CTRL_RSTEN, burtc::IF_COMP0, burtc::IF_OF, burtc::LOCK, burtc::POWERDOWN,
+    burtc::POWERDOWN_RAM, burtc::RET0_REG, burtc::RET127_REG, burtc::STATUS,
+    burtc::STATUS_BUMODETS, burtc::TIMESTAMP;
 
-// Lives in the backup domain: only a power-on reset or RMU's BURSTEN resets it.
+// Lives in the backup domain: only the loss of its power or RMU's BURSTEN resets it.
 class Burtc : public CompareCounter {
 public:
     explicit Burtc(Part &part)
@@ -152,11 +154,12 @@ public:
                          {CNT, {COMP0, NONE}, ~0u, CTRL_COMP0TOP, IF_OF, {IF_COMP0, 0}, 55}) {}
 
     void reset() override {
-        if (!(part.reset_cause & rmu::RSTCAUSE_PORST) && !part.rmu->backup_domain_resets())
-            return update_interrupts();
+        const bool unpowered = part.reset_cause & rmu::RSTCAUSE_PORST || part.backup_lost;
+        stamped = false;
+        if (!unpowered && !part.rmu->backup_domain_resets()) return update_interrupts();
         // The retention registers are memory: they keep their contents while there is power.
         std::array<uint32_t, RETAINED> retained = {};
-        if (!(part.reset_cause & rmu::RSTCAUSE_PORST))
+        if (!unpowered)
             std::copy_n(&reg(RET0_REG), RETAINED, retained.begin());
         LowEnergy::reset();
         std::copy(retained.begin(), retained.end(), &reg(RET0_REG));
@@ -182,6 +185,8 @@ public:
         }
         if (offset >= RET0_REG && reg(POWERDOWN) & POWERDOWN_RAM) return;
         CompareCounter::write(offset, value);
+        if (offset == CMD && value & CMD_CLRSTATUS)
+            reg(STATUS) = 0;
         if (offset == POWERDOWN && reg(POWERDOWN) & POWERDOWN_RAM)
             for (uint32_t at = RET0_REG; at <= RET127_REG; at += 4)
                 reg(at) = 0;
@@ -191,6 +196,11 @@ public:
         if (!oscillator_hertz)
             take_oscillator();
         CompareCounter::clocks_changed();
+        if (part.emu->in_backup() && !stamped && reg(CTRL) & CTRL_BUMODETSEN) {
+            stamped = true;
+            reg(TIMESTAMP) = value;
+            reg(STATUS) |= STATUS_BUMODETS;
+        }
     }
 
 private:
@@ -199,11 +209,12 @@ private:
 
     int64_t oscillator_hertz = 0;  // of the oscillator that it keeps running
     int64_t oscillator_origin = 0;
+    bool stamped = false;          // in the present backup mode
 
     // ULFRCO is not divided: it gives 2 kHz with PRESC = DIV1 and 1 kHz with all other values
     // (emlib's BURTC_Init and BURTC_ClockFreqGet).
     Rate clock() const override {
-        if (!oscillator_hertz || !counts()) return Rate();
+        if (!oscillator_hertz || !counts() || !runs_in_em4()) return Rate();
         const uint32_t divider = field(reg(CTRL), CTRL_PRESC);
         if (field(reg(CTRL), CTRL_CLKSEL) == ULFRCO)
             return {oscillator_hertz * (divider ? 1 : 2), 1, oscillator_origin};
@@ -218,7 +229,15 @@ private:
 
     bool counts() const override {
         const uint32_t mode = field(reg(CTRL), CTRL_MODE);
-        return mode && !(reg(CTRL) & CTRL_RSTEN) && part.mode <= (int)mode + 1;
+        return mode && !(reg(CTRL) & CTRL_RSTEN) && part.mode <= (int)mode + 1 &&
+               part.emu->backup_powered();
+    }
+
+    // In EM4 only ULFRCO and the oscillator that EM4CONF names run (10.5.5).
+    bool runs_in_em4() const {
+        const uint32_t chosen = field(reg(CTRL), CTRL_CLKSEL);
+        return part.mode < 4 || chosen == ULFRCO ||
+               chosen == field(part.emu->reg(emu::EM4CONF), emu::EM4CONF_OSC);
     }
 
     void flagged() override {
