@@ -1,14 +1,16 @@
 """XTCE 1.2 (OMG, XML Telemetric and Command Exchange) from an interface.
 
-An answer of the node protocol does not say which telemetry it is, so each frame is a container of
-its own, to be chosen by the request. A telecommand begins with its ID byte.
+Telemetry containers have an ID byte before the answer (``host.export.answers``), which a link puts
+there, and extend an abstract one: the ID tells them apart. A command begins with its ID byte; each
+telemetry frame has a command ``Request_…``.
 """
 
 from collections.abc import Iterator
 from xml.etree import ElementTree as Xml
 
 from cubestack.firmware_model.interface.codec.field import Field
-from cubestack.firmware_model.interface.codec.message import Interface, Message, MessageKind
+from cubestack.firmware_model.interface.codec.message import Interface, Message
+from cubestack.host.export.answers import answers, requested
 from cubestack.host.export.field_text import field_details
 
 
@@ -42,16 +44,15 @@ NAMESPACE = "http://www.omg.org/spec/XTCE/20180204"
 
 LITTLE = {"byteOrder": "leastSignificantByteFirst"}
 
+#: The container that all answers extend, and the parameter that tells them apart.
+BASE, PACKET_ID = "AnyAnswer", "PacketId"
+
 
 def xtce(interface: Interface) -> str:
     root = Xml.Element("SpaceSystem", {"xmlns": NAMESPACE, "name": interface.name})
     _text(root, "LongDescription", f"{interface.name}, interface version {interface.version}.")
-    of_kind = {
-        kind: [message for message in interface.messages if message.kind is kind]
-        for kind in MessageKind
-    }
-    _telemetry(Xml.SubElement(root, "TelemetryMetaData"), of_kind[MessageKind.TELEMETRY])
-    _commands(Xml.SubElement(root, "CommandMetaData"), of_kind[MessageKind.TELECOMMAND])
+    _telemetry(Xml.SubElement(root, "TelemetryMetaData"), answers(interface))
+    _commands(Xml.SubElement(root, "CommandMetaData"), interface)
     Xml.indent(root)
     return Xml.tostring(root, "unicode", xml_declaration=True) + "\n"
 
@@ -61,7 +62,7 @@ def parameter(message: Message, field: Field) -> str:
     return f"{message.name}_{field.name}"
 
 
-def _telemetry(parent: Xml.Element, messages: list[Message]) -> None:
+def _telemetry(parent: Xml.Element, messages: tuple[Message, ...]) -> None:
     types, names, containers = (
         Xml.SubElement(parent, f"{kind}Set") for kind in ("ParameterType", "Parameter", "Container")
     )
@@ -69,9 +70,15 @@ def _telemetry(parent: Xml.Element, messages: list[Message]) -> None:
         unused = Xml.SubElement(types, "BinaryParameterType", name=f"unused_{bits}_bits")
         _binary(unused, bits)
         _named(names, "Parameter", f"unused_{bits}", parameterTypeRef=f"unused_{bits}_bits")
+    byte = _named(types, "IntegerParameterType", f"{PACKET_ID}_type", signed="false")
+    Xml.SubElement(byte, "UnitSet")
+    Xml.SubElement(byte, "IntegerDataEncoding", {"sizeInBits": "8", "encoding": "unsigned"})
+    _named(names, "Parameter", PACKET_ID, parameterTypeRef=f"{PACKET_ID}_type")
+    base = _named(containers, "SequenceContainer", BASE, abstract="true")
+    Xml.SubElement(Xml.SubElement(base, "EntryList"), "ParameterRefEntry", parameterRef=PACKET_ID)
     for message in messages:
         container = _named(containers, "SequenceContainer", message.name)
-        _text(container, "LongDescription", f"Telemetry {message.id}: {message.meaning}")
+        _text(container, "LongDescription", f"ID {message.id}: {message.meaning}")
         entries = Xml.SubElement(container, "EntryList")
         for field, bits in slots(message):
             name = f"unused_{bits}" if field is None else parameter(message, field)
@@ -80,19 +87,20 @@ def _telemetry(parent: Xml.Element, messages: list[Message]) -> None:
                 _type(types, "Parameter", f"{name}_type", field)
                 declared = _named(names, "Parameter", name, parameterTypeRef=f"{name}_type")
                 _text(declared, "LongDescription", field_details(field))
+        extended = Xml.SubElement(container, "BaseContainer", containerRef=BASE)
+        criteria = Xml.SubElement(extended, "RestrictionCriteria")
+        Xml.SubElement(criteria, "Comparison", parameterRef=PACKET_ID, value=str(message.id))
 
 
-def _commands(parent: Xml.Element, messages: list[Message]) -> None:
-    if any(message.fields for message in messages):
+def _commands(parent: Xml.Element, interface: Interface) -> None:
+    if any(message.fields for message in interface.telecommands):
         types = Xml.SubElement(parent, "ArgumentTypeSet")
     commands = Xml.SubElement(parent, "MetaCommandSet")
-    for message in messages:
-        command = _named(commands, "MetaCommand", message.name)
-        _text(command, "LongDescription", f"Telecommand {message.id}: {message.meaning}")
-        arguments = Xml.SubElement(command, "ArgumentList") if message.fields else None
-        container = _named(command, "CommandContainer", message.name)
-        entries = Xml.SubElement(container, "EntryList")
-        Xml.SubElement(entries, "FixedValueEntry", binaryValue=f"{message.id:02X}", sizeInBits="8")
+    for message in requested(interface):
+        _command(commands, message, f"Request_{message.name}", f"Requests {message.name}")
+    for message in interface.telecommands:
+        about = f"Telecommand {message.id}: {message.meaning}"
+        arguments, entries = _command(commands, message, message.name, about)
         for field, bits in slots(message):
             if field is None or arguments is None:
                 zeros = "00" * -(-bits // 8)
@@ -104,6 +112,20 @@ def _commands(parent: Xml.Element, messages: list[Message]) -> None:
             declared = _named(arguments, "Argument", field.name, argumentTypeRef=of_type)
             _text(declared, "LongDescription", field_details(field))
             Xml.SubElement(entries, "ArgumentRefEntry", argumentRef=field.name)
+
+
+def _command(
+    parent: Xml.Element, message: Message, name: str, about: str
+) -> tuple[Xml.Element | None, Xml.Element]:
+    """A command that begins with the message's ID: its arguments, if any, and its entries."""
+    command = _named(parent, "MetaCommand", name)
+    _text(command, "LongDescription", about)
+    arguments = None
+    if message.fields and name == message.name:
+        arguments = Xml.SubElement(command, "ArgumentList")
+    entries = Xml.SubElement(_named(command, "CommandContainer", name), "EntryList")
+    Xml.SubElement(entries, "FixedValueEntry", binaryValue=f"{message.id:02X}", sizeInBits="8")
+    return arguments, entries
 
 
 def _type(parent: Xml.Element, kind: str, name: str, field: Field, limits: bool = False) -> None:
