@@ -27,13 +27,14 @@ DOCUMENTS ?=
 # Nothing here is made by a built-in rule: one would make "setup" of setup.sh.
 MAKEFLAGS += --no-builtin-rules
 
-.PHONY: help venv run docs test test-all test-hdl pasted firmware mutants lint wheels bench bench-engines clean
+.PHONY: help venv run docs test test-all test-hdl test-clients pasted firmware mutants lint wheels bench bench-engines clean
 
 help:
 	@echo "make run       set up, then boot the sensors, measure over their serial ports, and draw what they saw"
 	@echo "make test      set up, then run the tests, but for those that take long"
 	@echo "make test-all  set up, then run all tests"
 	@echo "make test-hdl  set up, then simulate the gateware: more than make test does, with coverage"
+	@echo "make test-clients  set up, install programs of others, then run them on the emulated ports"
 	@echo "make pasted    paste the commands of README.md and docs/ into a fresh clone, and tell how they end"
 	@echo "make firmware  set up, then build CubeStar's program in C with arm-none-eabi-gcc"
 	@echo "make mutants   set up, then count the wrong gates that the gateware's testbenches notice; takes long"
@@ -85,6 +86,11 @@ lint: .venv/ready-dev
 	@$(BIN)/ruff format --check .
 	@$(BIN)/python -m tests.prose
 	@./typecheck.sh
+
+test-clients: .venv/ready-dev
+	@tests/system/clients.sh out/clients
+	@CUBESTACK_CLIENTS=$(CURDIR)/out/clients $(PYTEST) -n 0 -m "slow or not slow" -rs tests/system/i2c_programs \
+		tests/system/serial_programs
 
 bench: .venv/ready-run
 	@$(BIN)/cubestack bench

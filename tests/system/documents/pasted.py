@@ -42,7 +42,15 @@ from .blocks import (
 
 MARK = "-- pasted, exit status"
 READY = "Ctrl-C ends it"
-LONG_TARGETS = {"test", "test-all", "test-hdl", "mutants", "bench-engines", "libraries"}
+LONG_TARGETS = {
+    "test",
+    "test-all",
+    "test-hdl",
+    "test-clients",
+    "mutants",
+    "bench-engines",
+    "libraries",
+}
 EMPTY_FOLDER = {"tutorial.md"}
 ENDING_S = 20.0
 TOLD = 15
