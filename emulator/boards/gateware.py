@@ -3,7 +3,7 @@
 import json
 import warnings
 from collections.abc import Callable, Collection, Iterable, Mapping
-from functools import partial
+from functools import cache
 from typing import Any
 
 from cubestack.emulator.native.cache import cache_folder, hash_of
@@ -13,6 +13,7 @@ from cubestack.hdl.blocks.pinned import RtlilComponent, Stride
 from cubestack.hdl.flow.generate import design_hash
 from cubestack.hdl.flow.tools import ToolMissingError
 from cubestack.hdl.user import Gateware, GatewareError, load_gateware
+from cubestack.hdl.user.copies import Cube, IdleCamera
 from cubestack.hdl.user.idle import IdleVerdict, cubes_without, prove_idle
 from cubestack.hdl.user.stored import source_hash, write_whole
 from cubestack.hdl.user.strides import proved_strides, stride_fields, stride_of
@@ -38,44 +39,47 @@ def with_gateware(wiring: Wiring, text: str, parameters: str = "") -> Wiring:
 
 
 def fitted(wiring: Wiring, gateware: RtlilComponent) -> Wiring:
-    """``wiring`` with a user's design; warns of clocks that must be simulated all the time."""
-    conditions = {
-        camera.name: _condition(wiring, gateware, camera, stacklevel=4) for camera in wiring.cameras
-    }
+    """``wiring`` with a user's design; warns of clocks that are simulated while it is idle."""
+    idle = {camera.name: _idle(wiring, gateware, camera, stacklevel=4) for camera in wiring.cameras}
 
     def storing(level: Level) -> Collection[str]:
-        return [name for name, may_store in conditions.items() if may_store(level)]
+        return [name for name, is_idle in idle.items() if not is_idle(level)]
 
     return wiring.with_design(gateware, storing)
 
 
-def _condition(
+def _idle(
     wiring: Wiring, gateware: RtlilComponent, camera: CameraPins, stacklevel: int
 ) -> Callable[[Level], bool]:
-    """When the camera's clock may have an effect: as for the shipped design if that is proved.
+    """When the camera's clock is proved to have no effect.
 
-    Else, if that is proved, for as long as the shipped design's command lasts, after it is done;
-    else at any time.
+    At most while the shipped design's command does not last, whatever the acknowledges.
     """
 
     def commanded(level: Level) -> Collection[str]:
         return wiring.storing(lambda pin: 0 if pin in wiring.acknowledges else level(pin))
 
-    for storing in (wiring.storing, commanded):
-        verdict = _verdict(wiring, gateware, camera, storing)
-        if verdict.proved:
-            return partial(_names, camera.name, storing)
-    warnings.warn(
-        f"{gateware.title}: {camera.clock} may have an effect at any time ({verdict.moves}), "
-        "so each of its clocks is simulated, which is slower",
-        GatewareNotice,
-        stacklevel=stacklevel,
-    )
-    return lambda _level: True
+    cubes, refuted, moves = _verdict(wiring, gateware, camera, commanded)
+    if refuted:
+        when = " or ".join(map(_words, refuted)) if cubes else "at any time"
+        warnings.warn(
+            f"{gateware.title}: {camera.clock} may have an effect {when} ({moves}), "
+            "so each of its clocks is simulated then, which is slower",
+            GatewareNotice,
+            stacklevel=stacklevel,
+        )
+    pins = [*dict.fromkeys(pin for cube in cubes for pin in cube)]
+
+    @cache
+    def is_idle(*levels: int) -> bool:
+        known = dict(zip(pins, levels, strict=True))
+        return any(cube.items() <= known.items() for cube in cubes)
+
+    return lambda level: is_idle(*map(level, pins))
 
 
-def _names(camera: str, storing: Callable[[Level], Collection[str]], level: Level) -> bool:
-    return camera in storing(level)
+def _words(cube: Cube) -> str:
+    return f"with {' '.join(f'{pin}={level}' for pin, level in cube.items())}"
 
 
 def _verdict(
@@ -86,12 +90,24 @@ def _verdict(
 ) -> IdleVerdict:
     cubes = cubes_without(camera.name, storing)
     masked = {memory["D_O"]: memory["D_OE"] for memory in wiring.memories}
-    call = f"{design_hash(gateware)} {camera.pins} {cubes} {masked}"
+    pins = idle_camera(wiring, camera)
+    call = f"{design_hash(gateware)} {pins} {cubes} {masked}"
     try:
-        found = _kept(call, lambda: prove_idle(gateware, camera.pins, cubes, masked))
-    except ToolMissingError as error:
-        return IdleVerdict(False, f"no proof: {error}")
+        found = _kept(call, lambda: prove_idle(gateware, pins, cubes, masked))
+    except (ToolMissingError, TimeoutError) as error:
+        return IdleVerdict([], cubes, f"no proof: {error}")
     return IdleVerdict(*found)
+
+
+def idle_camera(wiring: Wiring, camera: CameraPins) -> IdleCamera:
+    """Pins for the proof; an engine runs data clock and bus without a look at idle cameras."""
+    syncs = tuple(pin for pin in camera.pins if pin != camera.data)
+    bus = wiring.bus
+    driven = () if bus is None else (*bus.selects, bus.high, bus.latch, bus.read, bus.write)
+    strobed = {wiring.data_clock, *driven, *([f"{bus.low}_I"] if bus else [])}
+    return IdleCamera(
+        camera.data, syncs, tuple(pin for pin in wiring.mcu_pins if pin not in strobed)
+    )
 
 
 def _strides(wiring: Wiring, gateware: Gateware) -> list[Stride]:

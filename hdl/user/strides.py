@@ -21,7 +21,8 @@ from cubestack.hdl.flow.tools import ToolError, yosys_files
 from cubestack.hdl.proofs.model import Register
 from cubestack.hdl.proofs.prover import STEPS
 from cubestack.hdl.proofs.strides import each_clock
-from cubestack.hdl.user.idle import FLATTEN, LIMIT
+from cubestack.hdl.user.copies import FLATTEN
+from cubestack.hdl.user.idle import LIMIT
 from cubestack.hdl.user.netlist import Netlist
 from cubestack.hdl.user.nets import name_nets, registers_of
 from cubestack.hdl.user.rtlil import write_rtlil

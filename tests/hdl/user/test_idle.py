@@ -1,13 +1,20 @@
 """When a camera's clock has no effect on a user's design, and which strides it has."""
 
+from collections.abc import Collection
+
 import pytest
 
+from cubestack.emulator.boards.cubesense.wiring import cubesense_wiring
 from cubestack.emulator.boards.cubestar.wiring import cubestar_wiring
+from cubestack.emulator.boards.gateware import idle_camera
+from cubestack.emulator.rtl.wiring import Level
+from cubestack.firmware_model.interface.cubesense.fpga import READ_OUTS
+from cubestack.hdl.cubesense.pair import CubeSensePair
 from cubestack.hdl.cubestar.top import CubeStarTop
 from cubestack.hdl.flow.tools import have_yosys
 from cubestack.hdl.user.idle import cubes_without, prove_idle
 from cubestack.hdl.user.strides import proved_strides
-from tests.tiers import quick_ones
+from tests.tiers import quick, quick_ones
 
 from .designs import WORKING, load_design
 
@@ -28,16 +35,41 @@ def test_camera_clock_is_idle_where_it_provably_has_no_effect(name: str) -> None
     cubes = cubes_without(camera.name, wiring.storing)
     assert len(cubes) == 3
     design = load_design(WORKING[name], COLUMNS, ROWS)
-    verdict = prove_idle(design, camera.pins, cubes, {"SRAM_D_O": "SRAM_D_OE"})
-    assert verdict.proved == (name not in RESTLESS)
+    pins = idle_camera(wiring, camera)
+    verdict = prove_idle(design, pins, cubes, {"SRAM_D_O": "SRAM_D_OE"})
+    assert [*verdict.cubes] == ([] if name in RESTLESS else cubes)
     assert verdict.moves.startswith(RESTLESS.get(name, ""))
+
+
+@pytest.mark.parametrize(
+    ("variant", "camera"),
+    quick([(v, n) for v in ("as-flown", "corrected", "one-search") for n in (0, 1)], 2),
+)
+def test_cubesense_camera_is_idle_while_the_other_one_sends_and_stores(
+    variant: str, camera: int
+) -> None:
+    """But for the one-search FPGA of the Sun: sending alone, it searches what it sends."""
+    wiring = cubesense_wiring(CubeSensePair(READ_OUTS[variant]))
+    pins = wiring.cameras[camera]
+
+    def commanded(level: Level) -> Collection[str]:
+        return wiring.storing(lambda pin: 0 if pin in wiring.acknowledges else level(pin))
+
+    cubes = cubes_without(pins.name, commanded)
+    masked = {memory["D_O"]: memory["D_OE"] for memory in wiring.memories}
+    verdict = prove_idle(wiring.component, idle_camera(wiring, pins), cubes, masked)
+    alone = [{"SHIFT": 1, "EDGE": 0, "RNW": 0, "SUNEN": 0, "NADEN": 1}]
+    assert len(cubes) == 29
+    assert verdict.refuted == (alone if (variant, camera) == ("one-search", 0) else [])
+    assert len(verdict.cubes) == 29 - len(verdict.refuted)
 
 
 def test_storing_is_not_idle() -> None:
     wiring = cubestar_wiring(CubeStarTop(COLUMNS, ROWS))
     (camera,) = wiring.cameras
-    verdict = prove_idle(wiring.component, camera.pins, [{"ENABLE": 1}], {})
-    assert not verdict.proved
+    storing, idle = {"ENABLE": 1, "RNW": 0}, {"ENABLE": 1, "RNW": 1}
+    verdict = prove_idle(wiring.component, idle_camera(wiring, camera), [storing, idle], {})
+    assert ([*verdict.cubes], [*verdict.refuted]) == ([idle], [storing])
     assert verdict.moves
 
 
