@@ -51,7 +51,6 @@ uint32_t Cpu::run() {
             continue;
         }
         update_limit();
-        const bool watched = tracer != nullptr || steps_left != 0;
         const bool aside = aside_ready && r[15] == code_base;
         aside_ready = false;
         if (!aside && !find_code(r[15])) {
@@ -59,10 +58,10 @@ uint32_t Cpu::run() {
             continue;
         }
         arrive();
-        if (watched)
-            fetch_costs ? loop<3>() : loop<1>();
+        if (tracer != nullptr || steps_left != 0 || guarded)
+            loop<true>();
         else
-            fetch_costs ? loop<2>() : loop<0>();
+            loop<false>();
     }
     stop_requested = false;
     if (exits & (ExitBreakpoint | ExitWatchpoint | ExitStep)) stopped_at = r[15];

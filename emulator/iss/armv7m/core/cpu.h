@@ -142,6 +142,8 @@ public:
     std::vector<Region> regions;
     void add_region(const Region &region) { regions.push_back(region), regions_changed(); }
     void regions_changed();
+    // Call it after lines lost words other than by a fetch.
+    void lines_changed();
     // Call it after code in a region was changed other than by the core's stores.
     void invalidate(uint32_t address, uint32_t size);
 
@@ -186,10 +188,13 @@ private:
         uint32_t size;
         std::unique_ptr<Operation[], FreeCode> operations;
         std::unique_ptr<uint8_t[]> marks;
+        // The region that it ran in last: Operation::entry depends on its lines.
+        uint32_t base = 0;
+        FetchLines *lines = nullptr;
     };
 
     // Memory (memory/accesses.cpp).
-    Code *code_of(const Region &region);
+    Code &code_of(const Region &region);
     const Region *find_region(uint32_t address, uint32_t size) const;
     void written(const uint8_t *host, uint32_t size);
     bool note_watch(uint32_t address, uint32_t size, uint32_t value, bool write);
@@ -210,11 +215,14 @@ private:
     void fetch_failed();
     bool decode_at(uint32_t pc, Operation *op);
     bool run_aside(uint32_t pc);
-    bool fetch_cost(uint32_t pc, uint32_t halves);
+    bool may_fetch(uint32_t pc, uint32_t halves);
+    bool fetch(uint32_t pc, uint32_t halves, int64_t &now);
+    void fetch_again(Code &code);
+    void fetch_again(uint32_t line);
     void arrive();
 
     // Execution (execute/loop.cpp, cpu.cpp).
-    template <int Mode> void loop();
+    template <bool Checked> void loop();
     bool condition(uint32_t number) const;
     bool abandon(const Operation *op, Fault kind, uint32_t address);
     bool abandon(const Operation *op, Result result, bool write);
@@ -243,10 +251,10 @@ private:
     // The code that the loop executes: operations[0] is at code_base.
     Operation *operations = nullptr;
     uint32_t code_base = 0, code_size = 0;
+    size_t code_number = 0;            // its place in `codes`
     Operation aside[3] = {};           // an instruction outside all regions, or at a breakpoint
-    const FetchLines *lines = nullptr;
+    FetchLines *lines = nullptr;
     bool guarded = false;              // the MPU checks fetches
-    bool fetch_costs = false;          // `lines` or `guarded`
     uint32_t fetched = NOWHERE;        // the line, or block, of the last fetch
     Fault fetch_fault = {};            // why find_code found nothing
     bool aside_ready = false;          // aside[0] is to run next

@@ -4,6 +4,7 @@
 //                     (X: shifted by a constant) or a = register with the amount (LSL_V, ...)
 //   loads, stores     d = data, n = base, value = offset (O: offset, P: before, Q: after, with the
 //                     base written back) or m << shift (M); L: value from the aligned PC
+//   LDM, STM          value = bytes
 //   branches          value = distance from the instruction's own address
 
 #pragma once
@@ -26,9 +27,9 @@ namespace armv7m {
 #define ARMV7M_SIX(X, op) ARMV7M_THREE(X, op) X(op##S_I) X(op##S_R) X(op##S_X)
 #define ARMV7M_FOUR(X, op) X(op##_O) X(op##_M) X(op##_P) X(op##_Q)
 
-// All codes, in the order of their numbers. The first three are markers, not instructions.
+// All codes, in the order of their numbers. The first four are markers, not instructions.
 #define ARMV7M_CODES(X) \
-    X(UNDECODED) X(BREAK) X(REGION_END) \
+    X(UNDECODED) X(BREAK) X(REGION_END) X(FETCH) \
     ARMV7M_SIX(X, AND) ARMV7M_SIX(X, BIC) ARMV7M_SIX(X, ORR) ARMV7M_SIX(X, ORN) \
     ARMV7M_SIX(X, EOR) ARMV7M_SIX(X, ADD) ARMV7M_SIX(X, ADC) ARMV7M_SIX(X, SUB) \
     ARMV7M_SIX(X, SBC) ARMV7M_SIX(X, RSB) ARMV7M_SIX(X, MOV) ARMV7M_SIX(X, MVN) \
@@ -56,20 +57,27 @@ enum Code : uint16_t {
     CODE_COUNT
 };
 
-static_assert(CODE_COUNT <= 256, "Operation::in_it is a byte");
+static_assert(CODE_COUNT <= 256, "Operation::code is a byte");
 
-constexpr uint16_t LAST_MARKER = C_REGION_END;
+constexpr uint8_t LAST_MARKER = C_FETCH;
 
 // A decoded instruction in the cache of decoded code; all zero: not decoded yet.
 struct Operation {
-    uint16_t code;          // its handler
-    uint8_t in_it;          // its handler in an IT block: most 16-bit instructions set no flags
-    uint8_t stall;          // 1: the preceding instruction computes its address
+    uint16_t entry;         // where the loop goes: handler(), or a marker; C_FETCH while the fetch
+                            // of the instruction may cost something
+    uint8_t code;           // the instruction, or a marker
+    uint8_t in_it;          // the same in an IT block: most 16-bit instructions set no flags
     uint8_t d, n, m, a;
     uint32_t value;
-    uint8_t halves;         // its length in half-words
+    uint8_t halves : 2;     // its length in half-words
+    uint8_t stall : 1;      // the preceding instruction computes its address
+    uint8_t across : 1;     // 32 bits across two words: a branch here takes one cycle more
     uint8_t shift;
     uint16_t list;
+
+    // Number of its handler, which exist for 16-bit and for 32-bit instructions.
+    uint16_t handler() const { return (uint16_t)(code + (halves == 2 ? CODE_COUNT : 0)); }
+    void mark(uint8_t marker) { entry = code = in_it = marker; }
 };
 
 static_assert(sizeof(Operation) == 16, "the loop computes addresses from it");

@@ -152,6 +152,7 @@ Operation miscellaneous(uint32_t half) {
         op = make(pop ? C_LDM : C_STM, 0, 13, 1);
         op.list = (uint16_t)((half & 0xFF) | (half & 0x100) << (pop ? 7 : 6));
         op.a = !pop;
+        op.value = 4 * (uint32_t)__builtin_popcount(op.list);
         return op.list ? op : undefined();
     }
     case 6:    // CPS: bit 0 of `value` FAULTMASK, bit 1 PRIMASK, bit 4 disable
@@ -171,6 +172,7 @@ Operation multiple(uint32_t half) {
     const uint32_t n = half >> 8 & 7;
     Operation op = make(load ? C_LDM : C_STM, 0, n, 1);
     op.list = (uint16_t)(half & 0xFF);
+    op.value = 4 * (uint32_t)__builtin_popcount(op.list);
     if (load && (op.list >> n & 1)) op.m = 0;
     return op.list ? op : undefined();
 }

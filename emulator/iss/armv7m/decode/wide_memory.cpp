@@ -25,6 +25,7 @@ Operation load_store_multiple(uint32_t first, uint32_t second) {
     if (direction == 0 || direction == 3) return undefined_32();    // of other profiles
     Operation op = wide(load ? C_LDM : C_STM, 0, n, write_back);
     op.list = (uint16_t)second;
+    op.value = 4 * (uint32_t)bits_in(second);
     op.a = direction == 2;
     const bool odd = n == 15 || bits_in(second) < 2 || (second & 0x2000) ||
                      (load ? (second & 0xC000) == 0xC000 : (second & 0x8000) != 0) ||

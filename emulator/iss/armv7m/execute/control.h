@@ -1,10 +1,10 @@
 // Branches, hints and system instructions (ARMv7-M ARM A4.3, A4.8 to A4.10). Part of Cpu::loop.
 
-HANDLE(B) { GO(PC + op->value, REFILL_DIRECT); }
+HANDLE(B) { GO_DIRECT(); }
 
 #define BRANCH_IF(name, holds) \
     HANDLE(name) { \
-        if (holds) GO(PC + op->value, REFILL_DIRECT); \
+        if (holds) GO_DIRECT(); \
         NEXT(1); \
     }
 BRANCH_IF(B_EQ, (uint32_t)nz == 0)
@@ -25,9 +25,8 @@ BRANCH_IF(CBZ, r[op->n] == 0)
 BRANCH_IF(CBNZ, r[op->n] != 0)
 
 HANDLE(BL) {
-    const uint32_t pc = PC;
-    r[14] = (pc + 4) | 1;
-    GO(pc + op->value, REFILL_DIRECT);
+    r[14] = (PC + 4) | 1;
+    GO_DIRECT();
 }
 HANDLE(BLX) {
     const uint32_t to = r[op->m];
@@ -49,23 +48,6 @@ HANDLE(BX) {
     if (UNLIKELY(!thumb)) limit = INT64_MIN;
     GO(to & ~1u, REFILL_REGISTER);
 }
-// `target` was loaded into the PC; everything but 1 + REFILL_LOADED is in `now`.
-jump_loaded:
-    if (UNLIKELY(target >= 0xF0000000u && handler_mode())) {
-        now += 1;
-        goto leave_exception;
-    }
-    thumb = target & 1;
-    if (UNLIKELY(!thumb)) limit = INT64_MIN;
-    GO(target & ~1u, REFILL_LOADED);
-
-leave_exception:
-    SYNC();
-    count++;
-    REPORT(target);
-    system->exception_return(target);
-    goto failed;
-
 #define TABLE_BRANCH(name, type) \
     HANDLE(name) { \
         const uint32_t pc = PC, start = op->n == 15 ? pc + 4 : r[op->n]; \
@@ -109,7 +91,7 @@ HANDLE(MSR) {
     do { \
         now += 1; \
         count++; \
-        r[15] = PC + 2u * op->halves, cycles = now; \
+        r[15] = PC + 2u * HALVES, cycles = now; \
         REPORT(r[15]); \
         call; \
         goto failed; \

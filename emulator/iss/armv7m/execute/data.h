@@ -65,26 +65,33 @@ TEST(TEQ, a ^ b)
     carry = (uint8_t)(sum >> 32); \
     overflow = (uint8_t)(((first ^ total) & (second ^ total)) >> 31); \
     nz = total
-#define COMPARE(name, x, y, carry_in) \
+// The same for x - y, that is x, ~y and 1.
+#define DIFFERENCE_FLAGS(x, y) \
+    const uint32_t first = (x), second = (y), total = first - second; \
+    int32_t wrapped; \
+    carry = first >= second; \
+    overflow = __builtin_sub_overflow((int32_t)first, (int32_t)second, &wrapped); \
+    nz = total
+#define COMPARE(name, flags) \
     FORMS(name, { \
-        SUM_FLAGS(x, y, carry_in); \
+        flags; \
         NEXT(1); \
     })
-#define ARITHMETIC(name, x, y, carry_in) \
-    FORMS(name, RESULT((x) + (y) + (carry_in))) \
+#define ARITHMETIC(name, result, flags) \
+    FORMS(name, RESULT(result)) \
     FORMS(name##S, { \
-        SUM_FLAGS(x, y, carry_in); \
+        flags; \
         r[op->d] = total; \
         NEXT(1); \
     })
 
-ARITHMETIC(ADD, a, b, 0u)
-ARITHMETIC(ADC, a, b, (uint32_t)carry)
-ARITHMETIC(SUB, a, ~b, 1u)
-ARITHMETIC(SBC, a, ~b, (uint32_t)carry)
-ARITHMETIC(RSB, ~a, b, 1u)
-COMPARE(CMN, a, b, 0u)
-COMPARE(CMP, a, ~b, 1u)
+ARITHMETIC(ADD, a + b, SUM_FLAGS(a, b, 0u))
+ARITHMETIC(ADC, a + b + carry, SUM_FLAGS(a, b, (uint32_t)carry))
+ARITHMETIC(SUB, a - b, DIFFERENCE_FLAGS(a, b))
+ARITHMETIC(SBC, a + ~b + carry, SUM_FLAGS(a, ~b, (uint32_t)carry))
+ARITHMETIC(RSB, b - a, DIFFERENCE_FLAGS(b, a))
+COMPARE(CMN, SUM_FLAGS(a, b, 0u))
+COMPARE(CMP, DIFFERENCE_FLAGS(a, b))
 
 #define SHIFT(name, type) \
     HANDLE(name##_I) { \

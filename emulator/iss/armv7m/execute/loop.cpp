@@ -1,14 +1,18 @@
 // The loop that runs instructions: one label per operation, reached by computed goto.
 //
 // The state that every instruction needs is in local variables: `op`, and `now` for Cpu::cycles. It
-// is written back (SYNC) before anything else is called. Instructions in an IT block go through a
-// second table of labels, all of which lead to the code that checks the condition; so the others
-// have no cost for IT. Mode 1 calls a tracer and counts steps, mode 2 charges fetches and checks
-// the MPU.
+// is written back (SYNC) before anything else is called. The handlers exist twice, for 16-bit and
+// for 32-bit instructions, so that the address of the next operation is a sum with a constant.
+//
+// What few instructions need costs the others nothing:
+//  - instructions in an IT block go through a second table of labels, which check the condition;
+//  - an instruction whose fetch may cost something has the entry FETCH (Operation::entry);
+//  - the checked loop calls a tracer, counts steps and checks the MPU between two instructions.
 
 #include "armv7m/core/cpu.h"
 #include "armv7m/decode/decode.h"
 #include "armv7m/execute/cycles.h"
+#include "armv7m/execute/fetch.h"
 #include "armv7m/system/system.h"
 
 #include <cstring>
@@ -69,19 +73,23 @@ static inline uint32_t rotated(uint32_t value, uint32_t amount) {
     return amount ? value >> amount | value << (32 - amount) : value;
 }
 
-bool Cpu::condition(uint32_t number) const {
-    bool holds;
-    switch (number >> 1) {
-    case 0: holds = z(); break;
-    case 1: holds = carry; break;
-    case 2: holds = n(); break;
-    case 3: holds = overflow; break;
-    case 4: holds = carry && !z(); break;
-    case 5: holds = n() == (bool)overflow; break;
-    case 6: holds = n() == (bool)overflow && !z(); break;
-    default: return true;
+// Bit NZCV of word `number`: whether the condition holds (A7.3.1).
+static constexpr struct Conditions {
+    uint16_t holds[16] = {};
+    constexpr Conditions() {
+        for (unsigned flags = 0; flags < 16; flags++) {
+            const bool n = flags & 8, z = flags & 4, c = flags & 2, v = flags & 1;
+            const bool even[8] = {z, c, n, v, c && !z, n == v, n == v && !z, true};
+            for (unsigned number = 0; number < 16; number++)
+                if (number >= 14 || even[number >> 1] != (bool)(number & 1))
+                    holds[number] = (uint16_t)(holds[number] | 1u << flags);
+        }
     }
-    return holds != (bool)(number & 1);
+} CONDITIONS;
+
+inline bool Cpu::condition(uint32_t number) const {
+    const uint32_t flags = (uint32_t)n() << 3 | (uint32_t)z() << 2 | (uint32_t)carry << 1 | overflow;
+    return CONDITIONS.holds[number] >> flags & 1;
 }
 
 // Reports the failure of `op` to System, with the IT state before it. False: `op` completes.
@@ -111,15 +119,16 @@ bool Cpu::stepped(uint32_t next) {
     return true;
 }
 
-template <int Mode> void Cpu::loop() {
-#define ARMV7M_LABEL(name) &&L_##name,
-#define ARMV7M_IT(name) &&in_it,
-    static const void *const handlers[] = {ARMV7M_CODES(ARMV7M_LABEL)};
-    static const void *const it_handlers[] = {ARMV7M_CODES(ARMV7M_IT)};
-#undef ARMV7M_LABEL
-#undef ARMV7M_IT
+template <bool Checked> void Cpu::loop() {
+#define ARMV7M_NARROW(name) &&narrow_##name,
+#define ARMV7M_WIDE(name) &&wide_##name,
+#define ARMV7M_NARROW_IN_IT(name) \
+    C_##name <= LAST_MARKER ? &&narrow_##name : &&narrow_in_it,
+#define ARMV7M_WIDE_IN_IT(name) &&wide_in_it,
+    static const void *const handlers[] = {ARMV7M_CODES(ARMV7M_NARROW) ARMV7M_CODES(ARMV7M_WIDE)};
+    static const void *const it_handlers[] = {ARMV7M_CODES(ARMV7M_NARROW_IN_IT)
+                                              ARMV7M_CODES(ARMV7M_WIDE_IN_IT)};
 
-    constexpr bool TRACED = Mode & 1, FETCHED = Mode & 2;
     Operation *const ops = operations;
     Operation *op = ops + ((r[15] - code_base) >> 1);
     const uint32_t base = code_base, length = code_size;
@@ -128,28 +137,26 @@ template <int Mode> void Cpu::loop() {
     int64_t now = cycles;
     uint64_t count = 0;
     uint32_t target = 0;
+    // The last branch and where it led, or the first operation and null: with them, `fetched`.
+    const Operation *branch = nullptr, *arrival = op;
     // For the tracer's report at the end of the instruction.
     bool running = false;
     uint32_t traced_pc = 0;
     int64_t traced_since = 0;
     it_operation = nullptr;
-    // If only the MPU checks fetches, every fetch misses.
-    static constexpr uint32_t NO_TAG[1] = {NOWHERE};
-    const uint32_t *const tags = lines ? lines->tags : NO_TAG;
-    const uint32_t shift = lines ? lines->shift : 2, mask = lines ? lines->mask : 0;
 
-#define PC (base + (uint32_t)(((char *)op - (char *)ops) >> 3))
-#define HANDLE(name) L_##name:
+#define PC_OF(operation) (base + (uint32_t)(((const char *)(operation) - (const char *)ops) >> 3))
+#define PC PC_OF(op)
 #define DISPATCH() \
     do { \
-        if (Mode != 0) goto between; \
+        if (Checked) goto between; \
         if (UNLIKELY(now >= limit)) goto leave; \
-        goto *table[op->code]; \
+        goto *table[op->entry]; \
     } while (0)
 #define NEXT(cost) \
     do { \
         now += (cost); \
-        op += op->halves; \
+        op += HALVES; \
         count++; \
         DISPATCH(); \
     } while (0)
@@ -159,22 +166,59 @@ template <int Mode> void Cpu::loop() {
         target = (address); \
         now += 1 + (refill); \
         count++; \
+        branch = op; \
         if (UNLIKELY(target - base >= length)) { \
             arriving = (refill) < 3 && (target & 2) ? ArrivingOdd : Arriving; \
             goto far; \
         } \
         op = ops + ((target - base) >> 1); \
-        if (UNLIKELY(op->code == C_UNDECODED) && !decode_at(target & ~1u, op)) goto far; \
-        if ((refill) < 3 && op->halves == 2 && (target & 2)) now++; \
+        ARRIVE(refill); \
+    } while (0)
+// Likewise, at a distance known to the decoder.
+#define GO_DIRECT() \
+    do { \
+        now += 1 + REFILL_DIRECT; \
+        count++; \
+        branch = op; \
+        const int64_t to = ((const char *)op - (const char *)ops) + 8 * (int64_t)(int32_t)op->value; \
+        if (UNLIKELY((uint64_t)to >= 8 * (uint64_t)length)) { \
+            target = PC + op->value; \
+            arriving = target & 2 ? ArrivingOdd : Arriving; \
+            goto far; \
+        } \
+        op = (Operation *)((char *)ops + to); \
+        ARRIVE(REFILL_DIRECT); \
+    } while (0)
+#define ARRIVE(refill) \
+    do { \
+        arrival = op; \
+        if (UNLIKELY(op->code == C_UNDECODED)) { \
+            target = PC; \
+            if (!decode_at(target, op)) goto far; \
+        } \
+        if ((refill) < 3) now += op->across; \
         now -= op->stall;    /* the refill hides it */ \
         DISPATCH(); \
     } while (0)
 // Makes the state visible to callees.
 #define SYNC() (r[15] = PC, cycles = now)
+// Sets `fetched` to the last line of the operation that has begun, or that ended before `op`.
+#define FETCHED(operation) \
+    do { \
+        if (!Checked && lines != nullptr) \
+            fetched = (PC_OF(operation) + 2u * (operation)->halves - 2) >> lines->shift; \
+    } while (0)
+#define FETCHED_BEFORE() \
+    do { \
+        if (!Checked && lines != nullptr) { \
+            if (op != arrival) fetched = (PC - 2) >> lines->shift; \
+            else if (branch != nullptr) FETCHED(branch); \
+        } \
+    } while (0)
 // An instruction ended: calls the tracer and counts a step.
 #define REPORT(next) \
     do { \
-        if (TRACED && running) { \
+        if (Checked && running) { \
             running = false; \
             if (tracer != nullptr) \
                 tracer->instruction(traced_pc, (next), traced_since, now, *this); \
@@ -192,66 +236,85 @@ template <int Mode> void Cpu::loop() {
     DISPATCH();
 
 between:
-    if (TRACED) {
-        SYNC();
-        REPORT(r[15]);
-    }
+    SYNC();
+    REPORT(r[15]);
     if (UNLIKELY(now >= limit)) goto leave;
-    if (op->code > LAST_MARKER) {
-        if (FETCHED) {
-            const uint32_t pc = PC, first = pc >> shift;
-            const uint32_t last = (pc + 2u * op->halves - 2) >> shift;
-            const bool at_hand = (first == fetched || tags[first & mask] == first) &&
-                                 (last == first || tags[last & mask] == last);
-            if (UNLIKELY(!at_hand || guarded)) {
-                SYNC();
-                if (!fetch_cost(pc, op->halves)) {
-                    fetch_failed();
-                    goto failed;
-                }
-                now = cycles;
-            } else {
-                fetched = last;
-            }
-        }
-        if (TRACED) running = true, traced_pc = PC, traced_since = now;
-    }
-    goto *table[op->code];
-
-in_it:
     if (op->code <= LAST_MARKER) goto *handlers[op->code];
-    it_operation = op;
-    it_before = it;
-    it = it & 7 ? (uint8_t)((it & 0xE0) | (it << 1 & 0x1F)) : 0;
-    if (it == 0) table = handlers;
-    if (condition(it_before >> 4) || op->code == C_BKPT) goto *handlers[op->in_it];
-    NEXT(1);
+    if (guarded && !may_fetch(r[15], op->halves)) {
+        fetch_failed();
+        goto failed;
+    }
+    if (lines != nullptr) {
+        fetch(r[15], op->halves, now);
+    }
+    running = true, traced_pc = r[15], traced_since = now;
+    goto *table[op->handler()];
 
-    HANDLE(UNDECODED) {
-        const uint32_t pc = PC;
-        if (LIKELY(decode_at(pc, op))) DISPATCH();
+narrow_FETCH: {
+    bool stays = true;
+    if (lines != nullptr) {
+        FETCHED_BEFORE();
+        stays = fetch(PC, op->halves, now);
+    }
+    if (stays) op->entry = op->handler();
+    goto *table[op->handler()];
+}
+narrow_UNDECODED: {
+    const uint32_t pc = PC;
+    if (LIKELY(decode_at(pc, op))) DISPATCH();
+    goto aside_here;
+}
+narrow_BREAK: {
+    const uint32_t pc = PC;
+    if (!breakpoint_at(pc) || resume_at == pc) {    // of an alias, or passed already
+        resume_at = NOWHERE;
         goto aside_here;
     }
-    HANDLE(BREAK) {
-        const uint32_t pc = PC;
-        if (!breakpoint_at(pc) || resume_at == pc) {    // of an alias, or passed already
-            resume_at = NOWHERE;
-            goto aside_here;
-        }
-        exits |= ExitBreakpoint;
-        goto leave;
-    }
-    HANDLE(REGION_END) {
-        target = PC;
-        goto far;
-    }
+    exits |= ExitBreakpoint;
+    goto leave;
+}
+narrow_REGION_END:
+    FETCHED_BEFORE();
+    target = PC;
+    goto outside;
+wide_UNDECODED: wide_BREAK: wide_REGION_END: wide_FETCH: __builtin_unreachable();
 
+#define HANDLE(name) narrow_##name:
+#define HALVES 1
+#include "armv7m/execute/it.h"
+#include "armv7m/execute/data.h"
+#include "armv7m/execute/memory.h"
+#include "armv7m/execute/control.h"
+#undef HANDLE
+#undef HALVES
+#define HANDLE(name) wide_##name:
+#define HALVES 2
+#include "armv7m/execute/it.h"
 #include "armv7m/execute/data.h"
 #include "armv7m/execute/memory.h"
 #include "armv7m/execute/control.h"
 
+// `target` was loaded into the PC; everything but 1 + REFILL_LOADED is in `now`.
+jump_loaded:
+    if (UNLIKELY(target >= 0xF0000000u && handler_mode())) {
+        now += 1;
+        goto leave_exception;
+    }
+    thumb = target & 1;
+    if (UNLIKELY(!thumb)) limit = INT64_MIN;
+    GO(target & ~1u, REFILL_LOADED);
+
+leave_exception:
+    SYNC();
+    count++;
+    REPORT(target);
+    FETCHED(op);
+    system->exception_return(target);
+    goto done;
+
 aside_here:    // one instruction that cannot run in place
     SYNC();
+    FETCHED_BEFORE();
     instructions += count;
     if (run_aside(r[15]))
         aside_ready = true;
@@ -260,12 +323,10 @@ aside_here:    // one instruction that cannot run in place
     return;
 
 far:
-    if (TRACED) {
-        r[15] = target & ~1u, cycles = now;
-        REPORT(r[15]);
-    }
-    r[15] = target & ~1u;
-    cycles = now;
+    FETCHED(branch);
+outside:
+    r[15] = target & ~1u, cycles = now;
+    REPORT(r[15]);
     instructions += count;
     return;
 
@@ -273,18 +334,19 @@ watched:    // The instruction runs later, from here, with the same cycles.
     r[15] = PC, cycles = now - op->stall;
     if (op == it_operation) it = it_before;
 failed:    // System or run() set r[15]
+    FETCHED(op);
+done:
     attention_requested = true;
     instructions += count;
     return;
 
 leave:
     SYNC();
+    FETCHED_BEFORE();
     instructions += count;
 }
 
-template void Cpu::loop<0>();
-template void Cpu::loop<1>();
-template void Cpu::loop<2>();
-template void Cpu::loop<3>();
+template void Cpu::loop<false>();
+template void Cpu::loop<true>();
 
 }  // namespace armv7m

@@ -174,9 +174,9 @@ HANDLE(STORE_USER) {
 // restarts an LDM that is interrupted; here the interrupt waits for its end.)
 #define MULTIPLE() \
     uint32_t contents[16], list = op->list; \
-    const uint32_t registers = (uint32_t)__builtin_popcount(list); \
-    const uint32_t address = op->a ? r[op->n] - 4 * registers : r[op->n]; \
-    const uint32_t end = op->a ? address : address + 4 * registers; \
+    const uint32_t size = op->value, registers = size / 4; \
+    const uint32_t address = op->a ? r[op->n] - size : r[op->n]; \
+    const uint32_t end = op->a ? address : address + size; \
     const Page &page = map[address >> 20]; \
     const uint32_t offset = address & 0xFFFFF; \
     if (UNLIKELY(address & 3)) { \
@@ -186,9 +186,18 @@ HANDLE(STORE_USER) {
 HANDLE(LDM) {
     MULTIPLE()
     WAIT_FOR_BUS();
-    if (LIKELY((uint64_t)offset + 4 * registers <= page.read_limit)) {
-        std::memcpy(contents, page.host + offset, 4 * registers);
+    if (LIKELY((uint64_t)offset + size <= page.read_limit)) {
         now += 1 + (int64_t)registers * (1 + page.read_wait);
+        if (op->m) BASE_IS(end);
+        const uint8_t *from = page.host + offset;
+        for (list &= 0x7FFF; list; list &= list - 1, from += 4)
+            std::memcpy(&r[__builtin_ctz(list)], from, 4);
+        if (op->list & 0x8000) {
+            std::memcpy(&target, from, 4);
+            now -= 1;
+            goto jump_loaded;
+        }
+        NEXT(0);
     } else {
         r[15] = PC, cycles = now + 1;
         STOP_AT_WATCH(address, registers, 0, false)
@@ -210,15 +219,16 @@ HANDLE(LDM) {
 }
 HANDLE(STM) {
     MULTIPLE()
-    uint32_t *next = contents;
-    for (; list; list &= list - 1) *next++ = r[__builtin_ctz(list)];
     WAIT_FOR_BUS();
-    if (LIKELY((uint64_t)offset + 4 * registers <= page.write_limit)) {
-        std::memcpy(page.host + offset, contents, 4 * registers);
-        if (UNLIKELY(page.marks[offset >> 6] || page.marks[(offset + 4 * registers - 1) >> 6]))
-            written(page.host + offset, 4 * registers);
+    if (LIKELY((uint64_t)offset + size <= page.write_limit)) {
+        uint8_t *to = page.host + offset;
+        for (; list; list &= list - 1, to += 4) std::memcpy(to, &r[__builtin_ctz(list)], 4);
+        if (UNLIKELY(page.marks[offset >> 6] || page.marks[(offset + size - 1) >> 6]))
+            written(page.host + offset, size);
         now += 1 + (int64_t)registers * (1 + page.write_wait);
     } else {
+        uint32_t *next = contents;
+        for (; list; list &= list - 1) *next++ = r[__builtin_ctz(list)];
         r[15] = PC, cycles = now + 1;
         STOP_AT_WATCH(address, registers, contents[i], true)
         for (uint32_t i = 0; i < registers; i++) {
@@ -236,13 +246,21 @@ HANDLE(LDRD) {
     const uint32_t address = op->m == 2 ? start : start + op->value;
     if (UNLIKELY(address & 3)) FAIL(Fault::Unaligned);
     WAIT_FOR_BUS();
-    r[15] = PC, cycles = now + 1;
     uint32_t low, high;
-    STOP_AT_WATCH(address, 2, 0, false)
-    LOAD_OR_FAIL(address, 4, low, privileged());
-    cycles++;
-    LOAD_OR_FAIL(address + 4, 4, high, privileged());
-    now = cycles + 1;
+    const Page &page = map[address >> 20];
+    const uint32_t offset = address & 0xFFFFF;
+    if (LIKELY((uint64_t)offset + 8 <= page.read_limit)) {
+        std::memcpy(&low, page.host + offset, 4);
+        std::memcpy(&high, page.host + offset + 4, 4);
+        now += 3 + 2 * page.read_wait;
+    } else {
+        r[15] = PC, cycles = now + 1;
+        STOP_AT_WATCH(address, 2, 0, false)
+        LOAD_OR_FAIL(address, 4, low, privileged());
+        cycles++;
+        LOAD_OR_FAIL(address + 4, 4, high, privileged());
+        now = cycles + 1;
+    }
     if (op->m) BASE_IS(start + op->value);
     r[op->d] = low, r[op->a] = high;
     NEXT(0);
@@ -252,12 +270,22 @@ HANDLE(STRD) {
     const uint32_t address = op->m == 2 ? start : start + op->value;
     if (UNLIKELY(address & 3)) FAIL(Fault::Unaligned);
     WAIT_FOR_BUS();
-    r[15] = PC, cycles = now + 1;
-    STOP_AT_WATCH(address, 2, r[i ? op->a : op->d], true)
-    STORE_OR_FAIL(address, 4, r[op->d], privileged());
-    cycles++;
-    STORE_OR_FAIL(address + 4, 4, r[op->a], privileged());
-    now = cycles + 1;
+    const Page &page = map[address >> 20];
+    const uint32_t offset = address & 0xFFFFF;
+    if (LIKELY((uint64_t)offset + 8 <= page.write_limit)) {
+        std::memcpy(page.host + offset, &r[op->d], 4);
+        std::memcpy(page.host + offset + 4, &r[op->a], 4);
+        if (UNLIKELY(page.marks[offset >> 6] || page.marks[(offset + 7) >> 6]))
+            written(page.host + offset, 8);
+        now += 3 + 2 * page.write_wait;
+    } else {
+        r[15] = PC, cycles = now + 1;
+        STOP_AT_WATCH(address, 2, r[i ? op->a : op->d], true)
+        STORE_OR_FAIL(address, 4, r[op->d], privileged());
+        cycles++;
+        STORE_OR_FAIL(address + 4, 4, r[op->a], privileged());
+        now = cycles + 1;
+    }
     if (op->m) BASE_IS(start + op->value);
     NEXT(0);
 }

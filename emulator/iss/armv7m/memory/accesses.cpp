@@ -26,26 +26,25 @@ static bool in_private_bus(uint32_t address) { return address >> 20 == 0xE00; }
 
 void Cpu::FreeCode::operator()(Operation *operations) const { std::free(operations); }
 
-Cpu::Code *Cpu::code_of(const Region &region) {
+Cpu::Code &Cpu::code_of(const Region &region) {
     for (Code &code : codes)
-        if (code.host == region.host && code.size >= region.size) return &code;
+        if (code.host == region.host && code.size >= region.size) return code;
     // calloc: untouched pages take no memory. Two markers after the end stop even a 32-bit
     // instruction in the last half-word.
     const size_t count = region.size / 2 + 2;
     auto *operations = (Operation *)std::calloc(count, sizeof(Operation));
     const size_t blocks = (region.size >> MARK_SHIFT) + 1;
     codes.push_back({region.host, region.size, std::unique_ptr<Operation[], FreeCode>(operations),
-                     std::unique_ptr<uint8_t[]>(new uint8_t[blocks]())});
-    for (size_t i = count - 2; i < count; i++)
-        operations[i].code = operations[i].in_it = C_REGION_END;
-    return &codes.back();
+                     std::unique_ptr<uint8_t[]>(new uint8_t[blocks]()), region.base, region.lines});
+    for (size_t i = count - 2; i < count; i++) operations[i].mark(C_REGION_END);
+    return codes.back();
 }
 
 void Cpu::regions_changed() {
     pages.assign(1u << 12, Page());
     const bool guarded = system != nullptr && system->mpu.enabled();
     for (const Region &region : regions) {
-        const Code *code = code_of(region);
+        const Code &code = code_of(region);
         if (region.base % PAGE != 0) continue;    // accesses go through find_region
         for (uint32_t offset = 0; offset < region.size; offset += PAGE) {
             const uint32_t address = region.base + offset;
@@ -56,12 +55,13 @@ void Cpu::regions_changed() {
             for (const Watch &watch : watches)
                 watched |= watch.address < address + length && address < watch.address + watch.size;
             page.host = region.host + offset;
-            page.marks = code->marks.get() + (offset >> MARK_SHIFT);
+            page.marks = code.marks.get() + (offset >> MARK_SHIFT);
             page.read_limit = region.readable && !watched ? length : 0;
             page.write_limit = region.writable && !watched ? length : 0;
             page.read_wait = region.read_wait, page.write_wait = region.write_wait;
         }
     }
+    lines_changed();
     limit = INT64_MIN;
 }
 
@@ -75,7 +75,7 @@ const Region *Cpu::find_region(uint32_t address, uint32_t size) const {
 static void forget(Operation *operations, uint32_t offset, uint32_t size) {
     const uint32_t first = offset < 2 ? 0 : (offset - 2) / 2, last = (offset + size - 1) / 2;
     for (uint32_t i = first; i <= last; i++)
-        if (operations[i].code != C_REGION_END) operations[i].code = C_UNDECODED;
+        if (operations[i].code != C_REGION_END) operations[i].entry = operations[i].code = C_UNDECODED;
 }
 
 void Cpu::written(const uint8_t *host, uint32_t size) {

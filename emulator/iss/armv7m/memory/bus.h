@@ -7,17 +7,33 @@
 
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 
 namespace armv7m {
 
-// Cost of instruction fetches from a region. Words whose line is in `tags` cost nothing; for others
-// the core calls Bus::fetch, which may enter the line. So a loop inside an instruction cache or a
-// prefetch buffer runs without a call.
+// Cost of instruction fetches from a region: a cache or prefetch buffer before a slow array. Lines
+// in `tags` cost nothing; others are read from the array and enter it. One region has these lines.
 struct FetchLines {
     uint32_t *tags;       // tags[(address >> shift) & mask] == address >> shift: present
     uint32_t shift;       // log2 of the bytes of a line, 2 or more
     uint32_t mask;        // number of lines - 1
+    bool reported;        // the core calls Bus::fetch for each line that is not in `tags`
+
+    // The array reads a line in 1 + wait cycles. A sequential one was requested as soon as the one
+    // before it was read, or `ahead` cycles ago if that came from `tags`.
+    uint32_t wait, ahead;
+    uint32_t latest;      // the line that the array read last
+    int64_t free;         // the cycle at which that read ended
+
+    // Cycles by which reading this line from the array delays the program.
+    uint32_t read(uint32_t line, bool sequential, int64_t now) {
+        int64_t requested = now;
+        if (sequential) requested = line == latest + 1 ? free + 1 : now - ahead;
+        latest = line;
+        free = std::max(requested + (int64_t)wait, now - 1);
+        return (uint32_t)std::clamp<int64_t>(free - now, 0, wait);
+    }
 };
 
 // Memory that the core accesses directly. The fast path needs a region that begins at a multiple of
@@ -44,8 +60,8 @@ public:
     virtual bool read(uint32_t address, uint32_t size, uint32_t &value) = 0;
     virtual bool write(uint32_t address, uint32_t size, uint32_t value) = 0;
 
-    // Cycles by which the fetch of the word at `address` delays the program, for regions with
-    // lines. `sequential`: the previous word was fetched last; else a branch led there.
+    // Cycles by which the fetch of the line at `address` delays the program, for lines that are
+    // reported. `sequential`: the previous line was fetched last; else a branch led there.
     virtual uint32_t fetch(uint32_t address, bool sequential) {
         (void)address, (void)sequential;
         return 0;

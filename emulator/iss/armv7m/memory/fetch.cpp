@@ -4,6 +4,7 @@
 #include "armv7m/decode/decode.h"
 #include "armv7m/system/system.h"
 
+#include <algorithm>
 #include <cstring>
 
 namespace armv7m {
@@ -17,13 +18,17 @@ bool Cpu::find_code(uint32_t pc) {
     if (guarded && !system->mpu.allows(pc, Access::Fetch, privileged())) return false;
     const Region *region = find_region(pc, 2);
     if (region == nullptr || !region->readable) {
-        fetch_costs = guarded;
         return run_aside(pc);
     }
-    operations = code_of(*region)->operations.get();
+    Code &code = code_of(*region);
+    if (code.base != region->base || code.lines != region->lines) {
+        code.base = region->base, code.lines = region->lines;
+        fetch_again(code);
+    }
+    code_number = (size_t)(&code - codes.data());
+    operations = code.operations.get();
     code_base = region->base, code_size = region->size;
     lines = region->lines;
-    fetch_costs = guarded || lines != nullptr;
     return true;
 }
 
@@ -35,12 +40,13 @@ bool Cpu::run_aside(uint32_t pc) {
     if (!fetch_half(pc, first)) return false;
     if (is_wide(first) && !fetch_half(pc + 2, second)) return false;
     aside[0] = is_wide(first) ? decode_32(first, second) : decode_16(first);
-    aside[1].code = aside[1].in_it = aside[2].code = aside[2].in_it = C_REGION_END;
+    aside[0].entry = C_FETCH;
+    aside[1].mark(C_REGION_END), aside[2].mark(C_REGION_END);
     if (region != nullptr) {    // same timing as in place
         const uint32_t offset = pc - region->base;
-        aside[0].stall = address_stall(aside[0], region->host, offset);
+        aside[0].stall = address_stall(aside[0], region->host, offset) & 1;
         if (aside[0].code == C_IT)
-            aside[0].a = folds(offset, code_of(*region)->operations.get() + offset / 2);
+            aside[0].a = folds(offset, code_of(*region).operations.get() + offset / 2);
     }
     operations = aside;
     code_base = pc, code_size = 0;    // every branch leaves
@@ -70,9 +76,11 @@ bool Cpu::decode_at(uint32_t pc, Operation *op) {
         std::memcpy(halves, code.host + offset, offset + 4 <= code_size ? 4 : 2);
         if (is_wide(halves[0]) && offset + 4 > code_size) return false;
         *op = is_wide(halves[0]) ? decode_32(halves[0], halves[1]) : decode_16(halves[0]);
-        op->stall = address_stall(*op, code.host, offset);
+        op->stall = address_stall(*op, code.host, offset) & 1;
+        op->across = op->halves == 2 && pc & 2;
+        op->entry = lines ? (uint16_t)C_FETCH : op->handler();
         code.marks[offset >> 6] = code.marks[(offset + op->halves * 2 - 1) >> 6] = 1;
-        if (!breakpoints.empty() && breakpoint_at(pc)) op->code = op->in_it = C_BREAK;
+        if (!breakpoints.empty() && breakpoint_at(pc)) op->mark(C_BREAK);
         return true;
     }
     return false;
@@ -90,24 +98,27 @@ void Cpu::arrive() {
     cycles -= op->stall;
 }
 
-// Charges the fetch of an instruction and checks the MPU. False: it may not be fetched.
-bool Cpu::fetch_cost(uint32_t pc, uint32_t halves) {
-    const uint32_t last = pc + 2 * halves - 2;
-    if (guarded) {
-        for (uint32_t address = pc; address <= last; address += 2)
-            if (!system->mpu.allows(address, Access::Fetch, privileged())) {
-                fetch_fault = Fault::FetchViolation;
-                return false;
-            }
-    }
-    if (lines == nullptr) return true;
-    for (uint32_t line = pc >> lines->shift; line <= last >> lines->shift; line++) {
-        if (line == fetched) continue;
-        if (lines->tags[line & lines->mask] != line)
-            cycles += bus.fetch(line << lines->shift, line == fetched + 1);
-        fetched = line;
-    }
+// Whether the MPU lets the program fetch this instruction.
+bool Cpu::may_fetch(uint32_t pc, uint32_t halves) {
+    fetch_fault = Fault::FetchViolation;
+    for (uint32_t address = pc; address != pc + 2 * halves; address += 2)
+        if (!system->mpu.allows(address, Access::Fetch, privileged())) return false;
     return true;
+}
+
+// The fetch of all that is decoded there may cost something.
+void Cpu::fetch_again(Code &code) {
+    for (uint32_t offset = 0; offset < code.size; offset += 64) {
+        if (!code.marks[offset >> 6]) continue;
+        Operation *op = code.operations.get() + offset / 2;
+        for (uint32_t left = std::min(code.size - offset, 64u) / 2; left != 0; left--, op++)
+            if (op->entry > LAST_MARKER) op->entry = C_FETCH;
+    }
+}
+
+void Cpu::lines_changed() {
+    for (Code &code : codes)
+        if (code.lines != nullptr) fetch_again(code);
 }
 
 }  // namespace armv7m

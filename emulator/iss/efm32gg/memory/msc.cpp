@@ -45,14 +45,20 @@ void Msc::reset() {
 
 // -- reading --
 
-void Msc::invalidate_cache() { std::fill(std::begin(cache), std::end(cache), NO_TAG); }
+void Msc::invalidate_cache() {
+    std::fill(std::begin(cache), std::end(cache), NO_TAG);
+    part.cpu.lines_changed();
+}
 
-// The core calls fetch() for words that are not in `lines`: with the cache off all but the latest
-// word, and while hits are counted all words.
+// With the cache off only the latest word is in `lines`; while hits are counted none is, and the
+// core calls fetch(). The prefetch unit requests the next word one cycle after a hit, which is
+// assumed to be one cycle ago, or two with PREFETCH, with which the controller reads ahead as well.
 void Msc::set_up_reads() {
     wait_states = WAIT_STATES[field(reg(READCTRL), READCTRL_MODE)];
     lines.shift = 2;
+    lines.reported = counting();
     lines.tags = counting() ? missing : cache;
+    lines.wait = wait_states, lines.ahead = reg(READCTRL) & READCTRL_PREFETCH ? 2 : 1;
     lines.mask = reg(READCTRL) & READCTRL_IFCDIS ? 0 : CACHE_WORDS - 1;
     for (armv7m::Region &region : part.cpu.regions) {
         if (region.host != part.memories.flash) continue;
@@ -69,9 +75,6 @@ void Msc::check_wait_states() {
                       (int)FASTEST[wait_states]);
 }
 
-// The array reads a word in 1 + wait_states cycles. The core's prefetch unit requests the next word
-// as soon as it has the previous one; after a hit that is assumed to be one cycle ago, or two with
-// PREFETCH, with which the controller reads ahead as well.
 uint32_t Msc::fetch(uint32_t at, bool sequential) {
     const uint32_t tag = at >> 2, slot = tag & lines.mask;
     const bool caching = !(reg(READCTRL) & READCTRL_IFCDIS);
@@ -83,15 +86,7 @@ uint32_t Msc::fetch(uint32_t at, bool sequential) {
     cache[slot] = tag;
     if (counting() && caching)
         misses++;
-    const int64_t now = part.cpu.cycles;
-    int64_t requested = now;
-    if (sequential) {
-        const int64_t ahead = reg(READCTRL) & READCTRL_PREFETCH ? 2 : 1;
-        requested = tag == array_tag + 1 ? array_free + 1 : now - ahead;
-    }
-    array_tag = tag;
-    array_free = std::max(requested + (int64_t)wait_states, now - 1);
-    return (uint32_t)std::clamp<int64_t>(array_free - now, 0, wait_states);
+    return lines.read(tag, sequential, part.cpu.cycles);
 }
 
 int64_t Msc::read_wait(uint32_t at) {

@@ -30,8 +30,6 @@ private:
     armv7m::FetchLines lines{};
     uint32_t cache[CACHE_WORDS], missing[CACHE_WORDS];
     uint32_t wait_states = 0;
-    int64_t array_free = 0;          // cycle at which the flash array ends its last read
-    uint32_t array_tag = 0;          // of the word read
     uint32_t hits = 0, misses = 0;
 
     std::vector<uint32_t> wear;      // erasures by page since the part was created
