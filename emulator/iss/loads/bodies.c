@@ -1,6 +1,7 @@
-/* Floating point without a unit for it: bodies that attract one another, in double precision, and statistics in single. */
+/* Floating point without a unit for it: bodies that attract one another, in double precision, and
+   statistics in single. */
 
-#include "load.h"
+#include "load.inc"
 
 enum { BODIES = 4 };
 

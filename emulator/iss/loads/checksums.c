@@ -1,6 +1,6 @@
 /* CRC-32 by table and SHA-256 blocks. */
 
-#include "load.h"
+#include "load.inc"
 
 static uint32_t table[256];
 

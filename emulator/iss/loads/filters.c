@@ -1,6 +1,6 @@
-/* Signal processing in integers: FIR, biquads, a transform, and a JPEG-like 8 x 8 cosine transform. */
+/* Signal processing in integers: FIR, biquad, and a cosine transform of 4 x 4. */
 
-#include "load.h"
+#include "load.inc"
 
 enum { SAMPLES = 128, TAPS = 16 };
 
@@ -21,7 +21,8 @@ static uint32_t biquad(void) {
     int32_t x1 = 0, x2 = 0, y1 = 0, y2 = 0;
     for (int i = 0; i < SAMPLES; i++) {
         const int32_t x = filtered[i];
-        const int64_t y = (int64_t)3000 * x + (int64_t)5000 * x1 + (int64_t)2900 * x2 + (int64_t)9000 * y1 - (int64_t)4000 * y2;
+        const int64_t y = (int64_t)3000 * x + (int64_t)5000 * x1 + (int64_t)2900 * x2 +
+                          (int64_t)9000 * y1 - (int64_t)4000 * y2;
         x2 = x1, x1 = x, y2 = y1, y1 = (int32_t)(y >> 14);
         if (y1 > 32767) y1 = 32767;
         if (y1 < -32768) y1 = -32768;
@@ -30,7 +31,8 @@ static uint32_t biquad(void) {
 }
 
 static uint32_t cosine(void) {
-    static const int16_t basis[4][4] = {{64, 64, 64, 64}, {83, 36, -36, -83}, {64, -64, -64, 64}, {36, -83, 83, -36}};
+    static const int16_t basis[4][4] = {
+        {64, 64, 64, 64}, {83, 36, -36, -83}, {64, -64, -64, 64}, {36, -83, 83, -36}};
     uint32_t sum = 0;
     for (int at = 0; at + 16 <= SAMPLES; at += 16) {
         int32_t half[4][4];

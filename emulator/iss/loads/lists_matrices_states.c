@@ -1,7 +1,7 @@
 /* The mixture of CoreMark: a linked list that is searched, reversed and sorted, integer matrices, a
    state machine over text, and a CRC of all results. */
 
-#include "load.h"
+#include "load.inc"
 
 enum { NODES = 60, SIZE = 9, TEXT = 400 };
 

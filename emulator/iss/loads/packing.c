@@ -1,6 +1,6 @@
-/* Data by the byte: a Huffman code, runs and matches of a small dictionary coder, moves of blocks, and a queue. */
+/* Data by the byte: a Huffman code, and a coder that replaces what came before by its place. */
 
-#include "load.h"
+#include "load.inc"
 
 enum { BYTES = 512, SYMBOLS = 16 };
 

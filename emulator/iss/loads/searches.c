@@ -1,6 +1,7 @@
-/* Searches and decisions: quicksort, a heap, primes, a maze, patterns with wild cards, and a Petri-like net of conditions. */
+/* Searches and decisions: quicksort, a heap, primes, a maze, patterns with wild cards, and a net of
+   conditions. */
 
-#include "load.h"
+#include "load.inc"
 
 enum { VALUES = 200, WIDTH = 16 };
 

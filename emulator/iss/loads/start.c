@@ -1,6 +1,6 @@
 /* Start-up of a load on the part. The result is in r0 at `finished`. */
 
-#include "load.h"
+#include "load.inc"
 
 extern uint32_t data_source[], data_start[], data_end[], bss_start[], bss_end[], stack_top[];
 

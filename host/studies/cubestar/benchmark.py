@@ -12,7 +12,7 @@ from cubestack.emulator.boards.cubestar.benchmark import (
 )
 from cubestack.emulator.boards.cubestar.board import CubeStarBoard
 from cubestack.emulator.boards.cubestar.wiring import cubestar_wiring
-from cubestack.emulator.iss.benchmark import instructions_per_s
+from cubestack.emulator.iss.benchmark import instructions_per_s, unicorn_ratios
 from cubestack.emulator.rtl.benchmark import cold_build_s
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.host.clients.cubestar.client import CubeStar
@@ -48,6 +48,7 @@ def _figures(device: Device[CubeStarBoard, CubeStar]) -> dict[str, float]:
         figures["realtime_ratio"] = simulated_ratio(emulated, lambda: client.pause(float(LOOP_S)))
         client.command("StopLoop")
     figures["instructions_per_s"] = round(instructions_per_s())
+    figures |= unicorn_ratios()
     figures["firmware_ratio"] = _firmware_ratio(device)
     figures["cold_build_s"] = round(cold_build_s(cubestar_wiring()), 1)
     return figures | _i2c()
@@ -116,6 +117,8 @@ BENCHMARK = Benchmark(
         "readout_wall_ms": "wall time of one transfer, FPGA's SRAM to processor",
         "realtime_ratio": "simulated seconds per wall second of the full 1 Hz loop",
         "instructions_per_s": "of the instruction-set simulator, in an arithmetic loop",
+        "unicorn_ratio": "its speed by unicorn's, over six programs, where unicorn is installed",
+        "unicorn_ratio_waits": "the same with the cost of flash wait states, which unicorn lacks",
         "firmware_ratio": "as realtime_ratio, with the reference firmware on the simulator",
         "cold_build_s": "translating and compiling the FPGA with an empty cache",
         "i2c_ROUTE_fast": "byte reads a second of a program below `cubestack run`, by either route",

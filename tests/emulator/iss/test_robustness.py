@@ -1,87 +1,38 @@
 """Faulty programs, random accesses and inputs: every run ends, and a crash's cause is known."""
 
-import os
 import random
 import time
-from collections.abc import Iterator
 
 import pytest
 
 from cubestack.emulator.iss.insight.fault_report import last_fault
-from cubestack.emulator.iss.machine import EXTERNAL_BASE, RAM_BASE, Machine
+from cubestack.emulator.iss.machine import EXTERNAL_BASE, Machine
 from cubestack.emulator.iss.outcome import OutgoingKind, StopReason
 from cubestack.firmware_model.interface.efm32gg import LAYOUTS
 
 from .armv7m.thumb import Program
 from .efm32gg.bench import MS, US, WFI, Bench, S, asleep
-from .wild_images import KINDS
+from .fuzz import CASES, RUNS_AT_MOST, Fuzz, disturb
 
-RUNS_AT_MOST = 3000
-"""Runs per millisecond; a program that keeps resetting the part stops often."""
-
-SEEDS = int(os.environ.get("CUBESTACK_WILD_IMAGES", "600"))
-"""How many images; 10 000 have been run, with and without -fsanitize=address,undefined."""
+EACH = 300
+"""Images, and register set-ups; ``python -m tests.emulator.iss.fuzz`` runs more."""
 
 
 @pytest.fixture(scope="module")
-def machine() -> Iterator[Machine]:
-    made = Machine(external_bytes=1 << 20)
-    made.analog[8:10] = 25, 3.3
-    yield made
-    made.close()
+def machine(fuzz: Fuzz) -> Machine:
+    return fuzz.machine
 
 
-def start(machine: Machine, image: bytes) -> int:
-    """Load an image and reset; returns the time."""
-    machine.flash[:] = 0xFF
-    machine.flash[: len(image)] = memoryview(image)
-    machine.ram[:] = 0
-    machine.invalidate(0, machine.flash.size)
-    machine.invalidate(RAM_BASE, machine.ram.size)
-    machine.reset()
-    list(machine.outbox())
-    return machine.now_ps
+@pytest.fixture(scope="module")
+def fuzz() -> Fuzz:
+    return Fuzz()
 
 
-def disturb(machine: Machine, chance: random.Random) -> None:
-    """Apply one random input."""
-    unit, byte = chance.randrange(2), chance.getrandbits(8)
-    match chance.randrange(8):
-        case 0:
-            machine.pin(chance.randrange(6), chance.randrange(16), chance.randrange(-1, 2))
-        case 1:
-            machine.uart_receive(chance.randrange(8), chance.getrandbits(9), chance.randrange(4))
-        case 2:
-            machine.i2c_slave_start(unit, byte)
-        case 3:
-            machine.i2c_slave_write(unit, byte)
-        case 4:
-            machine.i2c_slave_read(unit, chance.random() < 0.5)
-        case 5:
-            machine.i2c_answer(unit, chance.random() < 0.5, byte)
-        case 6:
-            chance.choice((machine.i2c_slave_stop, machine.i2c_slave_poll))(unit)
-        case 7:
-            machine.analog[:] = [chance.uniform(-5, 5) for _ in machine.analog]
-            machine.analog_changed()
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_random_images_run_to_their_time(machine, kind):
-    for seed in range(SEEDS // len(KINDS)):
-        chance = random.Random(f"{kind} {seed}")
-        begin = start(machine, KINDS[kind](chance))
-        for _ in range(RUNS_AT_MOST):
-            if chance.random() < 0.2:
-                disturb(machine, chance)
-            step = chance.choice((1, 1000, 100_000, MS))
-            until = min(begin + MS, machine.now_ps + step)
-            stop = machine.run(until)
-            stopped = list(machine.outbox()) or stop.reason is not StopReason.TIME
-            assert stop.now_ps >= until or stopped
-            if machine.now_ps >= begin + MS:
-                break
-        assert len(machine.registers()) == 23
+@pytest.mark.parametrize("kind", CASES)
+@pytest.mark.parametrize("part", range(4))
+def test_random_cases_run_to_their_time(fuzz: Fuzz, kind: str, part: int) -> None:
+    for number in range(part, EACH, 4):
+        CASES[kind](fuzz, number)
 
 
 def program(text: str, stack: int = 0x2000_8000) -> bytes:
@@ -89,9 +40,9 @@ def program(text: str, stack: int = 0x2000_8000) -> bytes:
     return bytes(Program(f"{text}; b .; @3: b .", stack).image)
 
 
-def outcome(machine: Machine, image: bytes) -> set[OutgoingKind]:
+def outcome(fuzz: Fuzz, image: bytes) -> set[OutgoingKind]:
     """Kinds of messages in two milliseconds."""
-    begin = start(machine, image)
+    machine, begin = fuzz.machine, fuzz.start(image)
     kinds: set[OutgoingKind] = set()
     for _ in range(RUNS_AT_MOST):
         machine.run(begin + 2 * MS)
@@ -101,22 +52,22 @@ def outcome(machine: Machine, image: bytes) -> set[OutgoingKind]:
     return kinds
 
 
-def test_empty_vector_table_locks_up_and_the_part_resets(machine):
-    assert OutgoingKind.RESET in outcome(machine, b"")
+def test_empty_vector_table_locks_up_and_the_part_resets(fuzz):
+    assert OutgoingKind.RESET in outcome(fuzz, b"")
 
 
-def test_endless_loop_with_interrupts_off_ends_at_its_time(machine):
-    begin = start(machine, program("cpsid i"))
+def test_endless_loop_with_interrupts_off_ends_at_its_time(machine, fuzz):
+    begin = fuzz.start(program("cpsid i"))
     assert machine.run(begin + MS).reason == StopReason.TIME
     assert machine.now_ps - begin >= MS
 
 
 @pytest.mark.parametrize("on", [False, True])
-def test_semihosting_can_be_switched_on(machine, on):
+def test_semihosting_can_be_switched_on(machine, fuzz, on):
     machine.semihosting(on)
     text = ".org 0x600; .short 0x6968, 0x0021; .org 0x400"
     # SYS_WRITE0
-    begin = start(machine, program(f"{text}; ldr r1, =0x600; movs r0, #4; bkpt #0xAB"))
+    begin = fuzz.start(program(f"{text}; ldr r1, =0x600; movs r0, #4; bkpt #0xAB"))
     machine.run(begin + MS)
     calls = [one for one in machine.outbox() if one.kind is OutgoingKind.SEMIHOSTING]
     assert [(one.unit, one.value) for one in calls] == ([(4, 0x600)] if on else [])
@@ -125,12 +76,12 @@ def test_semihosting_can_be_switched_on(machine, on):
     machine.semihosting(False)
 
 
-def test_lock_up_stops_the_run_before_the_part_resets(machine):
+def test_lock_up_stops_the_run_before_the_part_resets(machine, fuzz):
     image = bytes(Program(".org 12; .short 1, 0x3000; .org 0x400; udf #0").image)
-    begin = start(machine, image)
+    begin = fuzz.start(image)
     assert machine.run(begin + MS).reason == StopReason.LOCKED_UP
     assert machine.register("pc") == 0x3000_0000
-    assert OutgoingKind.RESET in outcome(machine, image)
+    assert OutgoingKind.RESET in outcome(fuzz, image)
     assert last_fault(machine).exception == 0  # still known after the reset
     assert last_fault(machine).pc == 0x3000_0000
 
@@ -138,8 +89,8 @@ def test_lock_up_stops_the_run_before_the_part_resets(machine):
 @pytest.mark.parametrize(
     "base", [0x4000_0000, 0x400C_0000, 0xE000_0000, EXTERNAL_BASE, 0x1000_0000]
 )
-def test_every_word_of_a_block_can_be_read_and_written(machine, base):
-    start(machine, program(""))
+def test_every_word_of_a_block_can_be_read_and_written(machine, fuzz, base):
+    fuzz.start(program(""))
     for offset in range(0, 0x10000, 4):
         for value in (0, 0xFFFF_FFFF):
             machine.write(base + offset, value)

@@ -113,6 +113,13 @@ CLOCKS_ON = b"".join(
 """All clocks, except those of the core's bus that would stop a program."""
 
 
+def one_line_program(code: bytes, asleep: bool) -> bytes:
+    """A program that runs this code and then loops or sleeps; faults lead there too."""
+    end = (START + len(code)) | 1
+    image = struct.pack("<64I", STACK, START | 1, *[end] * 62).ljust(START, b"\xff")
+    return image + code + struct.pack("<2H", *((0xBF30, 0xE7FD) if asleep else (0xE7FE, 0xE7FE)))
+
+
 def accesses(chance: random.Random) -> bytes:
     """Loads and stores of all sizes, of registers and of unused addresses."""
     return _program(chance, b"".join(_access(chance, address(chance)) for _ in range(200)))

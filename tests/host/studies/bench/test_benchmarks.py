@@ -179,6 +179,7 @@ def test_cubestar_benchmark_reports_all_its_figures(
     names = ("rtl_clocks_per_s", "strides_per_s", "strobes_per_s", "instructions_per_s")
     for name, rate in zip(names, (1000.4, 2000.6, 3000.2, 4000.7), strict=True):
         monkeypatch.setattr(cubestar, name, lambda rate=rate: rate)
+    monkeypatch.setattr(cubestar, "unicorn_ratios", lambda: {"unicorn_ratio": 1.5})
     monkeypatch.setattr(cubestar, "cold_build_s", lambda wiring: built(wiring, 5.678))
     monkeypatch.setattr(cubestar, "_capture", lambda _emulated: {"capture_wall_ms": 1.0})
     monkeypatch.setattr(cubestar, "_i2c", lambda: {"i2c_seccomp_fast": 7.0})
@@ -189,6 +190,7 @@ def test_cubestar_benchmark_reports_all_its_figures(
         "capture_wall_ms": 1.0,
         "realtime_ratio": 4.0,
         "instructions_per_s": 4001,
+        "unicorn_ratio": 1.5,
         "firmware_ratio": 4.0,
         "cold_build_s": 5.7,
         "i2c_seccomp_fast": 7.0,
