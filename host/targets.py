@@ -29,7 +29,7 @@ from cubestack.host.clients.diagnosis import node_type_of, node_type_on
 from cubestack.host.clients.i2c import I2cBus, I2cClient
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.clients.registers import RegisterClient, RegisterLine
-from cubestack.host.devices.device import AnyDevice
+from cubestack.host.devices.device import AnyDevice, Engine
 from cubestack.host.devices.registry import device, device_names, devices
 from cubestack.host.emulation.controls import Controls, EmulatedControls
 from cubestack.host.emulation.emulated import node_client, open_device
@@ -90,6 +90,7 @@ def open_target(
     baud: int | None = None,
     scene: Path | None = None,
     seed: int = 0,
+    engine: Engine = "auto",
     record: Path | None = None,
     control: str | None = None,
     options: Mapping[str, Any] | None = None,
@@ -105,6 +106,7 @@ def open_target(
         baud: of the serial line; None for the published one.
         scene: scene file of an emulated device; None for its default.
         seed: of an emulated device.
+        engine: that runs an emulated device's FPGA.
         record: file for a recording of the session; an emulated device is recorded at its pins.
         control: control port of the process that emulates the device.
         options: of an emulated device's board, its profile among them.
@@ -124,8 +126,9 @@ def open_target(
     if text.startswith(EMULATED):
         if service_port is not None:
             raise TargetError(f"{text} has its bench protocol already: leave out --bench")
-        return _open_emulated(text, baud, scene, seed, record, options or {})
-    for name in (*(["scene"] if scene is not None else []), *(options or {})):
+        return _open_emulated(text, baud, scene, seed, engine, record, options or {})
+    given = {"scene": scene is not None, "engine": engine != "auto"}
+    for name in (*(name for name, here in given.items() if here), *(options or {})):
         raise TargetError(f"--{name} is for emulated:DEVICE, not for {text}")
     with ExitStack() as stack:
         tape = None
@@ -147,6 +150,7 @@ def _open_emulated(
     baud: int | None,
     scene: Path | None,
     seed: int,
+    engine: Engine,
     record: Path | None,
     options: Mapping[str, Any],
 ) -> Target:
@@ -154,7 +158,7 @@ def _open_emulated(
     if name not in device_names():
         known = ", ".join(EMULATED + one for one in device_names())
         raise TargetError(f"no device {name!r} can be emulated; known: {known}")
-    emulated = open_device(name, scene, seed=seed, baud=baud, **options)
+    emulated = open_device(name, scene, seed=seed, baud=baud, engine=engine, **options)
     board, interface = emulated.board, emulated.device.interface
     with ExitStack() as stack:
         stack.callback(emulated.close)

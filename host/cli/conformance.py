@@ -43,7 +43,7 @@ def run(args: argparse.Namespace) -> int:
     for number, text in enumerate([args.target, args.compare][: 1 + (args.compare is not None)]):
         if number:  # options are the first target's, but for the device
             args.bench = args.scene = args.baud = args.record = None
-            args.backup = False
+            args.backup, args.engine = False, "auto"
             vars(args).update(dict.fromkeys(given_options(args)))
         target = open_any_target(text, args)
         try:

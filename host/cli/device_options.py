@@ -237,6 +237,7 @@ def add_target_arguments(parser: argparse.ArgumentParser) -> None:
     add_flag(parser, "--backup", "the serial line speaks the register protocol")
     add_path(parser, "--scene", "for an emulated device")
     add_value(parser, "seed", whole(0, "for an emulated device", 0))
+    add_engine_arguments(parser)
     add_board_arguments(parser)
     add_path(parser, "--record", "record the session to FILE")
 
@@ -253,6 +254,7 @@ def open_any_target(text: str, args: argparse.Namespace) -> Target:
             baud=args.baud,
             scene=args.scene,
             seed=args.seed,
+            engine=args.engine,
             record=args.record,
             control=args.control,
             options=options,

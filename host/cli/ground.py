@@ -23,7 +23,12 @@ from typing import TYPE_CHECKING, Any
 
 from cubestack.firmware_model.values import whole
 from cubestack.host.cli.arguments import add_flag, add_path, add_value
-from cubestack.host.cli.device_options import add_board_arguments, add_line_arguments, given_options
+from cubestack.host.cli.device_options import (
+    add_board_arguments,
+    add_engine_arguments,
+    add_line_arguments,
+    given_options,
+)
 from cubestack.host.cli.ports import LAST_PORT
 from cubestack.host.devices.registry import device_names
 from cubestack.host.errors import TargetError
@@ -44,6 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_path(parser, "--record", "record the session with a device that is not emulated here")
     parser.add_argument("--scene", metavar="FILE", help="for an emulated device")
     add_value(parser, "seed", whole(None, "for an emulated device", 0))
+    add_engine_arguments(parser)
     add_board_arguments(parser)
     add_value(parser, "port", whole(0, "port of the page (default: any free one)", 0, LAST_PORT))
     add_flag(parser, "--json", "print the address as a JSON object")
@@ -98,7 +104,8 @@ def _check(targets: Sequence[str], options: Mapping[str, Any], record: Path | No
 
 def _options(args: argparse.Namespace) -> dict[str, Any]:
     """Those of emulated devices that were given, by name."""
-    given = {"scene": args.scene, "seed": args.seed, **given_options(args)}
+    engine = None if args.engine == "auto" else args.engine
+    given = {"scene": args.scene, "seed": args.seed, "engine": engine, **given_options(args)}
     return {name: value for name, value in given.items() if value is not None}
 
 

@@ -113,8 +113,8 @@ class Emulator:
         if self._device.switches.declared():
             profile = options.get("profile", DEFAULT_PROFILE)
             self._device.switches.of(profile, options.get("set", ""))
-        kept_from = {name: self.options[name] for name in ("scene", "seed") if name in self.options}
-        return kept_from | dict(options)
+        kept = ("scene", "seed", "engine")
+        return {name: self.options[name] for name in kept if name in self.options} | dict(options)
 
 
 class UploadedFile:

@@ -1,17 +1,13 @@
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
-from io import StringIO
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 from cubestack.emulator.camera.common.view import SkyView
 from cubestack.emulator.camera.mlx75412.lens import CONDITION
 from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
-from cubestack.emulator.faults.table import FAULTS
-from cubestack.emulator.scene.attitude import random_quaternion
 from cubestack.emulator.scene.earth_sun import EarthSunScene
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.hdl.cubestar.tops import TOPS
@@ -19,9 +15,8 @@ from cubestack.hdl.flow.tools import have_yosys, run_yosys
 from cubestack.hdl.flow.top import tops_in
 from cubestack.hdl.flow.verilog import verilog_file
 from cubestack.host.emulation.emulated import open_device
-from cubestack.host.emulation.records import start_recorder
-from cubestack.host.errors import HostError
 from tests.system.conftest import Ear
+from tests.system.life import life
 from tests.tiers import quick
 
 SKY = SkyScene.pointing(84, -1)
@@ -63,60 +58,7 @@ def test_same_seed_repeats_the_wire_to_the_picosecond(name: str) -> None:
     assert all(one != another for one, another in zip(first, other, strict=True))
 
 
-LAYOUTS = ("1", "2", "3", "two-boards")
-FAULTS_AT_ONCE = 3
-LATEST_S = 1.2
 QUICK = 6
-
-
-def life(
-    seed: int,
-    *,
-    strides: bool = True,
-    layouts: Sequence[str] = LAYOUTS,
-    gateware: str = "",
-    without: str = "",
-) -> dict[str, object]:
-    """Traffic and final state of a random sky, board and faults; no kind ``without…``."""
-    rng = np.random.default_rng(seed)
-    scene = SkyScene(random_quaternion(rng), mag_limit=4.0, seed=seed)
-    layout = layouts[int(rng.integers(len(layouts)))]
-    design = {"gateware": gateware} if gateware else {}
-    with open_device(
-        "cubestar", scene, seed=seed, engine="compiled", layout=layout, **design
-    ) as opened:
-        opened.board.engine.use_strides(strides)
-        recording = StringIO()
-        recorder = start_recorder(opened, recording)
-        kinds = [kind for kind, fault in FAULTS.items() if opened.faults.targets(fault.site)]
-        kinds = [kind for kind in kinds if not (without and kind.startswith(without))]
-        opened.faults.seed = seed
-        for kind in rng.choice(kinds, FAULTS_AT_ONCE):
-            targets = opened.faults.targets(FAULTS[kind].site)
-            target = targets[int(rng.integers(len(targets)))]
-            opened.faults.inject(str(kind), target=target, at_s=float(rng.uniform(0, LATEST_S)))
-        client = opened.client.client
-        for say, name, seconds in (
-            (client.command, "CaptureAndProcess", 0.9),
-            (client.telemetry, "ErrorFlags", 0.1),
-            (client.telemetry, "DetectionSummary", 0.1),
-            (client.command, "CaptureImage", 0.7),
-        ):
-            try:
-                say(name)
-            except HostError:
-                client.pause(0.05)
-            client.pause(seconds)
-        recorder.close()
-        board = opened.board
-        return {
-            "recording": recording.getvalue(),
-            "memories": [memory.tobytes() for memory in board.sites().all_memories().values()],
-            "violations": (board.engine.violations, dict(board.engine.violation_counts)),
-            "registers": board.engine.state(),
-            "faults": [str(event) for event in opened.faults.log],
-            "now": board.kernel.now,
-        }
 
 
 @pytest.fixture(scope="module")

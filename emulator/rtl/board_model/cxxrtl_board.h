@@ -1,20 +1,22 @@
-// A bridged design as CXXRTL's C++ has it, before synthesis. See settled.h for why eval() is called
-// twice before each commit: the design's clocks come out of the bridge's registers.
+// A bridged design as CXXRTL's C++ has it, before synthesis: one lane. See settled.h for why eval()
+// is called twice before each commit: the design's clocks come out of the bridge's registers.
 
 #pragma once
 
 #include "design.cpp"
+#include "lanes.h"
 
 struct Board {
-    bool rx = true, tx = true;
+    static constexpr int lanes = 1;
+    Bits rx = 1, tx = 1;
 
     Board() {
         top.p_rx.set<bool>(true);
         settle();
     }
 
-    bool clock() {
-        top.p_rx.set<bool>(rx);
+    Bits clock() {
+        top.p_rx.set<bool>(rx & 1);
         top.p_clk.set<bool>(true);
         const bool changed = settle();
         top.p_clk.set<bool>(false);

@@ -1,33 +1,35 @@
-"""A simulated board behind a pseudo-terminal, as a real one is behind its serial port."""
+"""Simulated boards behind pseudo-terminals, as real ones are behind their serial ports."""
 
 import os
 import pty
 import select
 import threading
 import tty
-from typing import Protocol, Self
+from contextlib import suppress
+from typing import Self
+
+from cubestack.emulator.rtl.board_model.board import SimulatedBoards
+
+_PIECE = 1 << 14  # bytes that are taken from a host at once
 
 
-class Board(Protocol):
-    """Any board, simulated or modelled."""
-
-    def receive(self, data: bytes) -> bytes:
-        """Take bytes from the host; returns those to the host."""
-
-
-class BoardPort:
-    """Serves ``board`` in a thread between ``start`` and ``close``, or as a context.
+class BoardPorts:
+    """Serves ``boards`` in a thread between ``start`` and ``close``, or as a context.
 
     Attributes:
-        path: of the terminal that a host opens.
+        paths: of the terminals that hosts open, one a board.
     """
 
-    def __init__(self, board: Board) -> None:
-        self._board = board
-        # The slave stays open here, so that a host may close and open it again.
-        self._master, self._slave = pty.openpty()
-        tty.setraw(self._slave)
-        self.path = os.ttyname(self._slave)
+    def __init__(self, boards: SimulatedBoards) -> None:
+        self._boards = boards
+        # The slaves stay open here, so that a host may close and open its own again.
+        pairs = [pty.openpty() for _ in range(len(boards))]
+        self._masters = {master: board for board, (master, _) in enumerate(pairs)}
+        self._slaves = [slave for _, slave in pairs]
+        for master, slave in pairs:
+            tty.setraw(slave)
+            os.set_blocking(master, False)
+        self.paths = [os.ttyname(slave) for slave in self._slaves]
         self._stop_read, self._stop_write = os.pipe()
         self._thread = threading.Thread(target=self._serve, daemon=True)
 
@@ -38,7 +40,7 @@ class BoardPort:
     def close(self) -> None:
         os.write(self._stop_write, b"x")
         self._thread.join()
-        for file in (self._master, self._slave, self._stop_read, self._stop_write):
+        for file in (*self._masters, *self._slaves, self._stop_read, self._stop_write):
             os.close(file)
 
     def __enter__(self) -> Self:
@@ -48,18 +50,28 @@ class BoardPort:
         self.close()
 
     def wait(self) -> None:
-        """Return when the board failed."""
+        """Return when the boards failed."""
         self._thread.join()
 
     def _serve(self) -> None:
-        waiting = b""
-        os.set_blocking(self._master, False)
+        count = len(self._boards)
+        to_board = [bytearray() for _ in range(count)]
+        to_host = [bytearray() for _ in range(count)]
         while True:
-            writers = [self._master] if waiting else []
-            reads, writes, _ = select.select([self._master, self._stop_read], writers, [])
+            readers = [master for master, n in self._masters.items() if len(to_board[n]) < _PIECE]
+            writers = [master for master, n in self._masters.items() if to_host[n]]
+            busy = any(to_board) or not all(map(self._boards.idle, range(count)))
+            reads, writes, _ = select.select(
+                [*readers, self._stop_read], writers, [], 0 if busy else None
+            )
             if self._stop_read in reads:
                 return
-            if self._master in reads:
-                waiting += self._board.receive(os.read(self._master, 1 << 14))
-            if self._master in writes:
-                waiting = waiting[os.write(self._master, waiting) :]
+            for master in reads:
+                to_board[self._masters[master]] += os.read(master, _PIECE)
+            for master in writes:
+                waiting = to_host[self._masters[master]]
+                with suppress(BlockingIOError):
+                    del waiting[: os.write(master, waiting)]
+            if any(to_board) or busy:
+                for waiting, received in zip(to_host, self._boards.run(to_board), strict=True):
+                    waiting += received

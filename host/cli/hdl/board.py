@@ -39,6 +39,7 @@ examples:
 SIMULATE = """Run the placed netlist of a build behind a pseudo-terminal, in place of a board
 with its bitstream. Prints the port, and runs until it is interrupted. For a
 quick simulation build with a high --baud, at most half of the bridge's clock.
+Up to 64 boards side by side take as long as one.
 
 examples:
   cubestack hdl board icebreaker --top TOP --baud 6000000 --out out/board
@@ -65,6 +66,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--mutant", choices=list(MUTANTS), metavar="FAULT", help=f"plant a fault: {names}"
     )
     add_value(simulate, "seed", whole(0, "chooses the fault's place", 0))
+    add_value(simulate, "count", whole(1, "boards that run side by side, a port each", 1, 64))
     simulate.set_defaults(board_action=_simulate)
     check = actions.add_parser(
         board_check.NAME, help=board_check.HELP, description=board_check.DESCRIPTION
@@ -112,16 +114,16 @@ def _build(args: argparse.Namespace) -> int:
 
 
 def _simulate(args: argparse.Namespace) -> int:
-    from cubestack.emulator.rtl.board_model.netlist_board import netlist_board
-    from cubestack.emulator.rtl.board_model.port import BoardPort
+    from cubestack.emulator.rtl.board_model.netlist_board import netlist_boards
+    from cubestack.emulator.rtl.board_model.port import BoardPorts
 
     with busy("compiling the netlist"):
-        board, fault = netlist_board(args.folder, args.mutant or "", args.seed)
+        boards, fault = netlist_boards(args.folder, args.count, args.mutant or "", args.seed)
     if fault:
         say(fault)
-    with BoardPort(board) as port:
-        print(port.path, flush=True)
-        port.wait()
+    with BoardPorts(boards) as ports:
+        print("\n".join(ports.paths), flush=True)
+        ports.wait()
     return 1
 
 
