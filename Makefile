@@ -61,7 +61,11 @@ run: .venv/ready-run
 test: .venv/ready-dev
 	@$(PYTEST) $(TESTS)
 
-test-all: .venv/ready-dev
+.venv/ready-board: .venv/ready-dev
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[board]"
+	@touch $@
+
+test-all: .venv/ready-board
 	@$(PYTEST) $(TESTS) -m "slow or not slow"
 
 pasted:

@@ -1,15 +1,15 @@
 """Whole devices on placed netlists behind pseudo-terminals: the compiled engine's bytes.
 
-BOARD_WHOLE=1 runs it: some ten minutes, for which nothing else must be slow.
+BOARD_WHOLE=1 runs it: about half an hour on two idle cores.
 """
 
 import multiprocessing
 import os
-import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ import pytest
 
 from cubestack.emulator.faults.table import FAULTS
 from cubestack.hdl.devboard.boards import BOARDS
+from cubestack.hdl.devboard.netlist import MUTANTS
 from cubestack.host.conformance.suite import run_suite
 from cubestack.host.emulation.emulated import open_device
 from cubestack.host.targets import open_target
@@ -86,33 +87,64 @@ JOBS: dict[tuple[str, str], list[Job]] = {
 }
 
 
-@pytest.fixture
-def addresses(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[list[str]]:
-    """Of simulated boards side by side, one for each job."""
-    board, top = request.param
-    baud = BOARDS[board].bridge_hz // 2
-    command = [sys.executable, "-m", "cubestack", "hdl", "board"]
-    build = [*command, board, "--top", top, "--baud", str(baud), "--out", str(tmp_path)]
-    subprocess.run(build, check=True, stderr=subprocess.DEVNULL)
-    count = len(JOBS[board, top])
-    simulate = [*command, "simulate", str(tmp_path), "--count", str(count)]
-    with subprocess.Popen(simulate, stdout=subprocess.PIPE, text=True) as process:
+COMMAND = (sys.executable, "-m", "cubestack", "hdl", "board")
+
+
+@pytest.fixture(scope="session")
+def build(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, str], Path]:
+    """Builds a top for a board, with a quick serial line; once."""
+    folder = tmp_path_factory.mktemp("placed")
+
+    def of(board: str, top: str) -> Path:
+        place = folder / f"{board}-{top}"
+        if not place.exists():
+            call = [*COMMAND, board, "--top", top, "--baud", str(baud_of(board))]
+            subprocess.run([*call, "--out", str(place)], check=True, stderr=subprocess.DEVNULL)
+        return place
+
+    return of
+
+
+def baud_of(board: str) -> int:
+    return BOARDS[board].bridge_hz // 2
+
+
+@contextmanager
+def simulated(place: Path, *options: str, count: int = 1) -> Iterator[list[str]]:
+    """Ports of boards that run side by side."""
+    call = [*COMMAND, "simulate", str(place), "--count", str(count), *options]
+    with subprocess.Popen(call, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
-        yield [f"board:{process.stdout.readline().strip()}@{baud}" for _ in range(count)]
-        process.send_signal(signal.SIGINT)
+        yield [process.stdout.readline().strip() for _ in range(count)]
+        process.terminate()
 
 
-@pytest.mark.parametrize(
-    ("addresses", "jobs"), [(key, JOBS[key]) for key in JOBS], indirect=["addresses"], ids=str
-)
+@pytest.mark.parametrize(("board", "top"), JOBS)
 def test_devices_on_placed_netlists_give_the_compiled_engine_s_bytes(
-    addresses: list[str], jobs: list[Job]
+    board: str, top: str, build: Callable[[str, str], Path]
 ) -> None:
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(len(jobs), mp_context=context) as pool:
+    jobs, context = JOBS[board, top], multiprocessing.get_context("spawn")
+    with (
+        simulated(build(board, top), count=len(jobs)) as ports,
+        ProcessPoolExecutor(len(jobs), mp_context=context) as pool,
+    ):
         running = {
-            pool.submit(differences, job, engine): f"{job[0].__name__} {job[1]}"
-            for job, engine in zip(jobs, addresses, strict=True)
+            pool.submit(differences, job, f"board:{port}@{baud_of(board)}"): job
+            for job, port in zip(jobs, ports, strict=True)
         }
         found = {running[future]: future.result() for future in as_completed(running)}
-    assert {name: text for name, text in found.items() if text} == {}
+    wrong = {f"{play.__name__} {which}": text for (play, which), text in found.items() if text}
+    assert wrong == {}
+
+
+@pytest.mark.parametrize("board", ["icebreaker", "ulx3s"])
+@pytest.mark.parametrize("mutant", ["", *MUTANTS])
+def test_check_of_the_board_finds_faults_of_the_netlist(
+    board: str, mutant: str, build: Callable[[str, str], Path]
+) -> None:
+    options = ["--mutant", mutant] if mutant else []
+    with simulated(build(board, "cubestar"), *options) as (port,):
+        call = [*COMMAND, "check", f"{port}@{baud_of(board)}", "--device", "cubestar", "--json"]
+        outcome = subprocess.run(call, check=False, capture_output=True, text=True)
+    print(outcome.stdout)
+    assert outcome.returncode == (1 if mutant else 0)
