@@ -23,10 +23,10 @@ def processor_header(tables: Processor) -> str:
     return f"{head}{tables.pins_header()}\n{end}"
 
 
-def _rows(tables: Processor) -> Iterator[tuple[str, int, Register, bool]]:
-    """Peripheral, address, register, and whether it is modelled, by address."""
+def _rows(tables: Processor) -> Iterator[tuple[str, int, Register]]:
+    """Peripheral, address, register, by address."""
     rows = (
-        (instance.name, instance.base + register.offset, register, layout.modelled)
+        (instance.name, instance.base + register.offset, register)
         for layout in tables.layouts
         for instance in layout.instances
         for register in layout.registers
@@ -46,9 +46,9 @@ def _access(register: Register) -> str:
 
 def _table(tables: Processor) -> str:
     lines = [f"{tables.name}: address, register, access, value after a reset, fields"]
-    for owner, address, register, modelled in _rows(tables):
+    for owner, address, register in _rows(tables):
         fields = " ".join(_bits(field) for field in register.fields if field.name)
-        kept = "" if modelled and register.modelled else "  (only kept)"
+        kept = "" if register.modelled else "  (only kept)"
         name = f"{owner}.{register.name}"
         start = f"{address:08X} {name:24} {_access(register):2} {register.reset:08X}"
         lines.append(f"{start} {fields}{kept}".rstrip())
@@ -58,7 +58,7 @@ def _table(tables: Processor) -> str:
 
 def _markdown(tables: Processor) -> str:
     lines = ["| address | register | access | reset | fields |", "|---|---|---|---|---|"]
-    for owner, address, register, _modelled in _rows(tables):
+    for owner, address, register in _rows(tables):
         fields = " ".join(f"`{_bits(field)}`" for field in register.fields if field.name)
         lines.append(
             f"| {address:08X} | {owner}.{register.name} | {_access(register)} | "
@@ -74,14 +74,14 @@ def _json(tables: Processor) -> str:
             "name": register.name,
             "address": address,
             "reset": register.reset,
-            "modelled": modelled and register.modelled,
+            "modelled": register.modelled,
             "fields": [
                 {"name": one.name, "lsb": one.lsb, "width": one.width}
                 | {"readable": one.readable, "writable": one.writable}
                 for one in register.fields
             ],
         }
-        for owner, address, register, modelled in _rows(tables)
+        for owner, address, register in _rows(tables)
     ]
     return json.dumps({"name": tables.name, "registers": registers}, indent=1) + "\n"
 

@@ -25,7 +25,6 @@ struct Layout {
     const Register *registers;
     int32_t count;
     uint32_t size;
-    bool modelled;
     int32_t if_, ifs, ifc, ien, freeze, syncbusy, cmd;  // offsets, or -1
 };
 
@@ -86,7 +85,7 @@ def _tables(layouts: list[Layout]) -> Iterator[str]:
         yield (
             f'inline const Layout {layout.name}_LAYOUT = {{"{layout.name}", '
             f"{layout.name}_REGISTERS, {len(layout.registers)}, 0x{layout.size:X}, "
-            f"{_bool(layout.modelled)}, {', '.join(map(str, offsets))}}};"
+            f"{', '.join(map(str, offsets))}}};"
         )
     yield "namespace instance {"
     for layout in layouts:

@@ -79,7 +79,6 @@ class Layout:
     title: str  #: description and chapter of the reference manual
     registers: tuple[Register, ...]  #: in the order of their offsets
     instances: tuple[Instance, ...]  #: peripherals of the part
-    modelled: bool = True  #: False if the emulator has only the table
 
     @property
     def size(self) -> int:
@@ -113,9 +112,7 @@ class Processor:
     core: Core = Core()  #: EFM32GG Reference Manual, chapter 4
 
 
-def peripheral(
-    name: str, title: str, registers: str, *instances: Instance, modelled: bool = True
-) -> Layout:
+def peripheral(name: str, title: str, registers: str, *instances: Instance) -> Layout:
     """The layout declared by ``registers``; RegisterTableError names a wrong line."""
     found: dict[int, Register] = {}
     names: set[str] = set()
@@ -125,7 +122,7 @@ def peripheral(
                 raise RegisterTableError(f"{name}: declared twice: {line.strip()!r}")
             found[register.offset] = register
             names.add(register.name)
-    return Layout(name, title, tuple(found[at] for at in sorted(found)), instances, modelled)
+    return Layout(name, title, tuple(found[at] for at in sorted(found)), instances)
 
 
 def _registers(layout: str, line: str) -> Iterator[Register]:

@@ -99,9 +99,7 @@ class Fuzz:
         self.run_case(chance, self.machine.now_ps, chance.choice((1, 1, 5, 50)) * MS)
 
 
-MODELLED = [
-    layout for layout in LAYOUTS if layout.modelled and layout.instances[0].base >= 0x4000_0000
-]
+MODELLED = [layout for layout in LAYOUTS if layout.instances[0].base >= 0x4000_0000]
 CASES: dict[str, Callable[[Fuzz, int], None]] = {"images": Fuzz.image, "registers": Fuzz.registers}
 
 

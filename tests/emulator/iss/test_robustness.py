@@ -103,7 +103,7 @@ def test_every_word_of_a_block_can_be_read_and_written(machine, fuzz, base):
 # -- accesses to registers without a program --
 
 UNITS = {"USART", "LEUART", "I2C", "TIMER", "LETIMER", "RTC", "BURTC", "PCNT", "ADC", "DAC", "ACMP",
-         "VCMP", "DMA", "PRS", "GPIO", "AES"}  # fmt: skip
+         "VCMP", "DMA", "PRS", "GPIO", "AES", "LESENSE"}  # fmt: skip
 ALL, INTERFACES = (
     [
         (instance.base + register.offset, register.writable)

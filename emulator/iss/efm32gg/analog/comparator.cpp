@@ -1,6 +1,8 @@
 // Comparators: ACMP of two voltages, VCMP of the supply. EFM32GG Reference Manual, chapters 26
 // and 27. They compare when an input or their registers change; the response time is not modelled.
 // Not modelled: capacitive sense.
+#include "efm32gg/analog/comparator.h"
+
 #include "efm32gg/analog/dac.h"
 #include "efm32gg/part/part.h"
 #include "efm32gg/pins/gpio.h"
@@ -101,16 +103,28 @@ private:
     }
 };
 
-class Acmp : public Comparator {
+class Acmp : public Comparator, public SensorComparator {
 public:
     using Comparator::Comparator;
 
     Acmp *partner = nullptr;  // on the same interrupt line
 
+    bool sense(int channel, int level, bool before) const override {
+        uint32_t selected = reg(acmp::INPUTSEL);
+        if (channel >= 0)
+            selected = (selected & ~acmp::INPUTSEL_POSSEL) | (uint32_t)channel;
+        if (level >= 0)
+            selected = (selected & ~acmp::INPUTSEL_VDDLEVEL) |
+                       to_field((uint32_t)level, acmp::INPUTSEL_VDDLEVEL);
+        return above(selected, before);
+    }
+
 private:
-    bool above(bool before) const override {
+    bool above(bool before) const override { return above(reg(acmp::INPUTSEL), before); }
+
+    // `selected`: as INPUTSEL.
+    bool above(uint32_t selected, bool before) const {
         const int channels = instance.index ? analog::ACMP1_CH0 : analog::ACMP0_CH0;
-        const uint32_t selected = reg(acmp::INPUTSEL);
         const uint32_t negative = field(selected, acmp::INPUTSEL_NEGSEL);
         const double supply = part.volts(analog::VDD);
         double against = 0;
@@ -165,6 +179,8 @@ void add_comparators(Part &part) {
     auto *second = part.add(new Acmp(part, instance::ACMP1));
     first->partner = second;
     second->partner = first;
+    part.comparators[0] = first;
+    part.comparators[1] = second;
     part.add(new Vcmp(part, instance::VCMP));
 }
 

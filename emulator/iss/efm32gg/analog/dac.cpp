@@ -23,7 +23,7 @@ void Dac::reset() {
     for (Channel &one : channels) {
         part.cancel(one.converted);
         one.converting = one.stalled = one.driven = false;
-        one.code = one.next = 0;
+        one.code = one.next = one.sensed_code = one.sensed_leads = 0;
     }
     follow();
 }
@@ -101,9 +101,9 @@ void Dac::prs_changed(int channel, bool level) {
     follow();
 }
 
-void Dac::drive(int channel, uint32_t code) {
-    channels[channel].code = code & CH0DATA_DATA;
-    channels[channel].driven = true;
+void Dac::sense(int channel, uint32_t code, uint32_t leads) {
+    channels[channel].sensed_code = code & CH0DATA_DATA;
+    channels[channel].sensed_leads = leads;
     part.analog_changed();
 }
 
@@ -120,6 +120,7 @@ double Dac::reference() const {
 // of the reference (29.3.5).
 double Dac::output(int channel) const {
     const bool difference = reg(CTRL) & CTRL_DIFF;
+    if (channels[channel].sensed_leads) return reference() * channels[channel].sensed_code / FULL;
     const Channel &one = channels[difference ? 0 : channel];
     if (!on(one) || !one.driven) return 0;
     if (!difference) return reference() * one.code / FULL;
@@ -131,7 +132,9 @@ double Dac::output(int channel) const {
 double Dac::pin_volts(int pin) const {
     for (int channel = 0; channel < CHANNELS; channel++) {
         const Channel &one = channels[reg(CTRL) & CTRL_DIFF ? 0 : channel];
-        if (pin == PINS[channel] && leads(TO_PIN) && on(one) && one.driven) return output(channel);
+        if (pin == PINS[channel] && leads(channels[channel], TO_PIN) &&
+            (channels[channel].sensed_leads || (on(one) && one.driven)))
+            return output(channel);
     }
     return NAN;
 }

@@ -21,11 +21,14 @@ public:
     void prs_changed(int channel, bool level) override;
 
     // Volts of a channel inside of the part, for ADC and comparators; 0 if it is not led there.
-    double internal_volts(int channel) const { return leads(INTERNAL) ? output(channel) : 0; }
+    double internal_volts(int channel) const {
+        return leads(channels[channel], INTERNAL) ? output(channel) : 0;
+    }
     // Volts at a port pin (port * 16 + bit); NaN if no channel drives it.
     double pin_volts(int pin) const;
-    // LESENSE supplies the data of a channel.
-    void drive(int channel, uint32_t code);
+    // LESENSE supplies the data of a channel and leads it: to the pin (1), ADC and ACMPs (2), both
+    // (3); it does not need to be enabled. 0 ends this.
+    void sense(int channel, uint32_t code, uint32_t leads);
 
 private:
     enum Lead : uint32_t { TO_PIN = 1, INTERNAL = 2 };
@@ -35,6 +38,7 @@ private:
         int number;
         bool converting = false, stalled = false, driven = false;
         uint32_t code = 0, next = 0;  // at the output, and after the conversion
+        uint32_t sensed_code = 0, sensed_leads = 0;  // from LESENSE
         Event converted = Event::of<&Channel::on_converted>(this);
 
         void on_converted(int64_t) { dac->finish(*this); }
@@ -47,8 +51,9 @@ private:
     }
     bool on(const Channel &one) const { return control(one) & dac::CH0CTRL_EN; }
     uint32_t valid(const Channel &one) const { return dac::STATUS_CH0DV << one.number; }
-    bool leads(Lead where) const {
-        return field(reg(dac::CTRL), dac::CTRL_OUTMODE) & where;
+    bool leads(const Channel &one, Lead where) const {
+        return (one.sensed_leads ? one.sensed_leads
+                                 : field(reg(dac::CTRL), dac::CTRL_OUTMODE)) & where;
     }
     double reference() const;
     double output(int channel) const;

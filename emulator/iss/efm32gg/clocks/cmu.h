@@ -28,6 +28,8 @@ public:
     void sleep(int mode) { sleeping = mode; }
     void wake();
     bool low_frequency_on() const;
+    // AUXHFRCO's frequency, whether it runs or not: LESENSE starts it when it needs it.
+    int64_t auxiliary_hertz() const { return hertz(*this, AUXHFRCO); }
 
 private:
     enum Oscillators { HFRCO, HFXO, AUXHFRCO, LFRCO, LFXO, OSCILLATORS };

@@ -63,7 +63,7 @@ protected:
     virtual Rate synchronizer() const { return clock_now(); }
 
 private:
-    static constexpr int MOST = 8;
+    static constexpr int MOST = 24;
     struct Write {
         uint32_t offset, value;
         bool applied;
@@ -73,7 +73,7 @@ private:
     int count = 0;
     Synchronizer synchronizing{part, Event::of<&LowEnergy::on_synchronized>(this)};
 
-    bool frozen() const { return reg((uint32_t)layout.freeze) & 1; }
+    bool frozen() const { return layout.freeze >= 0 && reg((uint32_t)layout.freeze) & 1; }
 
     void on_synchronized(int64_t) {
         synchronizing.clear();

@@ -30,6 +30,7 @@ class I2c;
 class SerialReceiver;
 class Timer;
 class Dac;
+class SensorComparator;
 
 enum class Clock { HFCORE, HFPER, HFCORELE, LFA, LFB, HFRCO, HFXO, AUXHFRCO, LFXO, LFRCO, ULFRCO };
 constexpr int CLOCKS = 11;
@@ -190,6 +191,7 @@ public:
     std::vector<I2c *> i2cs;
     std::vector<Timer *> timers;
     Dac *dac = nullptr;
+    SensorComparator *comparators[2] = {};
 
     // Takes ownership of a peripheral.
     template <class Unit> Unit *add(Unit *unit) {
@@ -250,5 +252,6 @@ void add_pulse_counters(Part &part);
 void add_adc(Part &part);
 void add_aes(Part &part);
 void add_comparators(Part &part);
+void add_lesense(Part &part);
 
 }  // namespace efm32gg

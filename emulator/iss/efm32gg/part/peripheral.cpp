@@ -64,9 +64,4 @@ void Peripheral::report_locked() const {
     part.log_once("%s is locked: a write to its registers is lost", instance.name);
 }
 
-uint32_t Unmodelled::read(uint32_t) {
-    part.log_once("%s is not modelled: it reads 0 and ignores writes", instance.name);
-    return 0;
-}
-
 }  // namespace efm32gg

@@ -84,13 +84,4 @@ private:
     std::vector<const Register *> descriptions;
 };
 
-// A peripheral with a register table but no behaviour: it reads 0. The first access is reported.
-class Unmodelled : public Peripheral {
-public:
-    using Peripheral::Peripheral;
-    uint32_t read(uint32_t offset) override;
-    void write(uint32_t offset, uint32_t) override { read(offset); }
-    uint32_t peek(uint32_t) const override { return 0; }
-};
-
 }  // namespace efm32gg

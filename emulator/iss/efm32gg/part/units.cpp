@@ -50,9 +50,7 @@ void Part::add_units() {
     add_adc(*this);
     dac = add(new Dac(*this, instance::DAC0));
     add_comparators(*this);
-    for (const Instance *one : INSTANCES)
-        if (one->base >= PERIPHERALS && !peripheral_at(one->base))
-            add(new Unmodelled(*this, *one));
+    add_lesense(*this);
 }
 
 void Part::uart_receive(int unit, uint32_t data, uint32_t flags) {

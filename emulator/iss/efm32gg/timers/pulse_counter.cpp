@@ -56,6 +56,11 @@ private:
         return ROUTES[signals + signal][field(reg(ROUTE), ROUTE_LOCATION)];
     }
 
+    bool second_input() const {
+        return reg(INPUT) & INPUT_S1PRSEN ? part.prs->level((int)field(reg(INPUT), INPUT_S1PRSSEL))
+                                          : part.gpio->input(pin(1));
+    }
+
     void edge(bool rising) {
         const uint32_t control = reg(CTRL), mode = field(control, CTRL_MODE);
         if ((mode != 1 && mode != 2) || control & CTRL_RSTEN || rising == !!(control & CTRL_EDGE) ||
@@ -63,7 +68,7 @@ private:
             return;
         bool down = control & CTRL_CNTDIR;
         if (control & CTRL_S1CDIR)
-            down = !part.gpio->input(pin(1));
+            down = !second_input();
         if (down != !!(reg(STATUS) & STATUS_DIR)) {
             reg(STATUS) = down ? STATUS_DIR : 0;
             raise(IF_DIRCNG);
