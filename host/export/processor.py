@@ -78,6 +78,7 @@ def _json(tables: Processor) -> str:
             "fields": [
                 {"name": one.name, "lsb": one.lsb, "width": one.width}
                 | {"readable": one.readable, "writable": one.writable}
+                | ({"values": dict(one.values)} if one.values else {})
                 for one in register.fields
             ],
         }
@@ -161,6 +162,10 @@ def _field(parent: Xml.Element, field: RegisterField) -> None:
     own = Xml.SubElement(parent, "field")
     _texts(own, name=field.name, bitOffset=field.lsb, bitWidth=field.width)
     _texts(own, access=_access_text(field.readable, field.writable))
+    if field.values:
+        values = Xml.SubElement(own, "enumeratedValues")
+        for number, name in field.values:
+            _texts(Xml.SubElement(values, "enumeratedValue"), name=name, value=number)
 
 
 def _access_text(readable: bool, writable: bool) -> str:

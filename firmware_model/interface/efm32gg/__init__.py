@@ -9,11 +9,11 @@ from cubestack.firmware_model.interface.efm32gg.system import CLOCKS, SYSTEM
 from cubestack.firmware_model.interface.efm32gg.table import Instance, Layout, Register
 from cubestack.firmware_model.interface.efm32gg.timers import TIMERS
 from cubestack.firmware_model.interface.efm32gg.transfers import DMA, EXTERNAL_BUS
+from cubestack.firmware_model.interface.efm32gg.values import with_values
 
 #: All kinds of peripherals of the part.
-LAYOUTS: tuple[Layout, ...] = (
-    *(*SYSTEM, *CLOCKS, *PORTS, *EXTERNAL_BUS),
-    *(*SERIAL, *TIMERS, *ANALOG, LESENSE, DMA, AES),
+LAYOUTS: tuple[Layout, ...] = with_values(
+    (*(*SYSTEM, *CLOCKS, *PORTS, *EXTERNAL_BUS), *(*SERIAL, *TIMERS, *ANALOG, LESENSE, DMA, AES))
 )
 
 

@@ -35,6 +35,7 @@ class RegisterField:
     width: int
     readable: bool
     writable: bool
+    values: tuple[tuple[int, str], ...] = ()  #: the named ones
 
     @property
     def mask(self) -> int:

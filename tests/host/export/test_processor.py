@@ -143,6 +143,11 @@ def test_parser_finds_part_and_access_rights(tables, device) -> None:
             fields = {field.name: field for field in wanted.fields}
             for field in register.fields or ():
                 own = fields[field.name]
+                groups = field.enumerated_values or ()
+                found = [
+                    (one.value, one.name) for group in groups for one in group.enumerated_values
+                ]
+                assert found == list(own.values)
                 assert str(field.access.value) == access(own.readable, own.writable)
 
 

@@ -1,0 +1,222 @@
+"""Names of field values, after the register descriptions of the EFM32GG Reference Manual.
+
+A line is ``UNIT.REGISTER.FIELD NAME NAME ...``, with patterns as in file names; the first line that
+matches counts. The names are those of the values from 0 on; ``-`` is reserved; ``16:NAME``
+continues at 16. ``DIV1-DIV128`` is every power of two in between.
+"""
+
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from fnmatch import fnmatchcase
+
+from cubestack.firmware_model.interface.efm32gg.pins import ROUTES
+from cubestack.firmware_model.interface.efm32gg.table import (
+    Layout,
+    RegisterField,
+    RegisterTableError,
+)
+
+_TABLE = """
+MSC.READCTRL.MODE           WS0 WS1 WS0SCBTP WS1SCBTP WS2 WS2SCBTP
+MSC.READCTRL.BUSSTRATEGY    CPU DMA DMAEM1 NONE
+EMU.MEMCTRL.POWERDOWN       4:BLK3 6:BLK23 7:BLK123
+EMU.EM4CONF.OSC             ULFRCO LFRCO LFXO
+EMU.BUCTRL.PROBE            DISABLE VDDDREG BUIN BUOUT
+EMU.PWRCONF.PWRRES          RES0 RES1 RES2 RES3
+EMU.BU*ACT.PWRCON           NONE BUMAIN MAINBU NODIODE
+WDOG.CTRL.CLKSEL            ULFRCO LFRCO LFXO
+CMU.CTRL.?FXOMODE           XTAL BUFEXTCLK DIGEXTCLK
+CMU.CTRL.HFXOBOOST          50PCENT 70PCENT 80PCENT 100PCENT
+CMU.CTRL.HFXOBUFCUR         - BOOSTUPTO32MHZ - BOOSTABOVE32MHZ
+CMU.CTRL.HFXOTIMEOUT        8CYCLES 256CYCLES 1KCYCLES 16KCYCLES
+CMU.CTRL.LFXOTIMEOUT        8CYCLES 1KCYCLES 16KCYCLES 32KCYCLES
+CMU.CTRL.CLKOUTSEL0         HFRCO HFXO HFCLK2 HFCLK4 HFCLK8 HFCLK16 ULFRCO AUXHFRCO
+CMU.CTRL.CLKOUTSEL1         LFRCO LFXO HFCLK LFXOQ HFXOQ LFRCOQ HFRCOQ AUXHFRCOQ
+CMU.HF*CLKDIV.HF*CLKDIV     HFCLK HFCLK2-HFCLK512
+CMU.*.HFCORECLKLEDIV        DIV2 DIV4
+CMU.HFRCOCTRL.BAND          1MHZ 7MHZ 11MHZ 14MHZ 21MHZ 28MHZ
+CMU.AUXHFRCOCTRL.BAND       14MHZ 11MHZ 7MHZ 1MHZ - - 28MHZ 21MHZ
+CMU.CALCTRL.UPSEL           HFXO LFXO HFRCO LFRCO AUXHFRCO
+CMU.CALCTRL.DOWNSEL         HFCLK HFXO LFXO HFRCO LFRCO AUXHFRCO
+CMU.CMD.HFCLKSEL            - HFRCO HFXO LFRCO LFXO
+CMU.CMD.USBCCLKSEL          - HFCLKNODIV LFXO LFRCO
+CMU.LFCLKSEL.LF[AB]         DISABLED LFRCO LFXO HFCORECLKLEDIV2
+CMU.LFAPRESC0.LESENSE       DIV1-DIV8
+CMU.LFAPRESC0.RTC           DIV1-DIV32768
+CMU.LFAPRESC0.LETIMER0      DIV1-DIV32768
+CMU.LFAPRESC0.LCD           DIV16-DIV128
+CMU.LFBPRESC0.LEUART?       DIV1-DIV8
+GPIO.P?_CTRL.DRIVEMODE      STANDARD LOWEST HIGH LOW
+GPIO.P?_MODE?.MODE*         DISABLED INPUT INPUTPULL INPUTPULLFILTER PUSHPULL PUSHPULLDRIVE WIREDOR
++   WIREDORPULLDOWN WIREDAND WIREDANDFILTER WIREDANDPULLUP WIREDANDPULLUPFILTER WIREDANDDRIVE
++   WIREDANDDRIVEFILTER WIREDANDDRIVEPULLUP WIREDANDDRIVEPULLUPFILTER
+GPIO.EXTIPSEL?.*            PORTA PORTB PORTC PORTD PORTE PORTF
+PRS.CH*.EDSEL               OFF POSEDGE NEGEDGE BOTHEDGES
+PRS.CH*.SOURCESEL           NONE VCMP ACMP0 ACMP1 6:DAC0 8:ADC0 16:USART0 USART1 USART2 28:TIMER0
++   TIMER1 TIMER2 TIMER3 40:RTC UART0 UART1 48:GPIOL GPIOH 52:LETIMER0 55:BURTC 57:LESENSEL
++   LESENSEH LESENSED
+EBI.CTRL.MODE*              D8A8 D16A16ALE D8A24ALE D16
+EBI.ROUTE.ALB               A0 A8 A16 A24
+USART.CTRL.OVS              X16 X8 X6 X4
+USART.CTRL.CLKPOL           IDLELOW IDLEHIGH
+USART.CTRL.CLKPHA           SAMPLELEADING SAMPLETRAILING
+USART.CTRL.TXDELAY          NONE SINGLE DOUBLE TRIPLE
+LEUART.CTRL.TXDELAY         NONE SINGLE DOUBLE TRIPLE
+USART.FRAME.DATABITS        - FOUR FIVE SIX SEVEN EIGHT NINE TEN ELEVEN TWELVE THIRTEEN FOURTEEN
++   FIFTEEN SIXTEEN
+USART.FRAME.PARITY          NONE - EVEN ODD
+USART.FRAME.STOPBITS        HALF ONE ONEANDAHALF TWO
+USART.IRCTRL.IRPW           ONE TWO THREE FOUR
+USART.I2SCTRL.FORMAT        W32D32 W32D24M W32D24 W32D16 W32D8 W16D16 W16D8 W8D8
+LEUART.CTRL.DATABITS        EIGHT NINE
+LEUART.CTRL.PARITY          NONE - EVEN ODD
+LEUART.CTRL.STOPBITS        ONE TWO
+I2C.CTRL.CLHR               STANDARD ASYMMETRIC FAST
+I2C.CTRL.BITO               OFF 40PCC 80PCC 160PCC
+I2C.CTRL.CLTO               OFF 40PCC 80PCC 160PCC 320PCC 1024PCC
+I2C.STATE.STATE             IDLE WAIT START ADDR ADDRACK DATA DATAACK
+TIMER.CTRL.MODE             UP DOWN UPDOWN QDEC
+TIMER.CTRL.QDM              X2 X4
+TIMER.CTRL.RISEA            NONE START STOP RELOADSTART
+TIMER.CTRL.FALLA            NONE START STOP RELOADSTART
+TIMER.CTRL.CLKSEL           PRESCHFPERCLK CC1 TIMEROUF
+TIMER.CTRL.PRESC            DIV1-DIV1024
+TIMER.CC?_CTRL.MODE         OFF INPUTCAPTURE OUTPUTCOMPARE PWM
+TIMER.CC?_CTRL.C*OA         NONE TOGGLE CLEAR SET
+TIMER.CC?_CTRL.INSEL        PIN PRS
+TIMER.CC?_CTRL.ICEDGE       RISING FALLING BOTH NONE
+TIMER.CC?_CTRL.ICEVCTRL     EVERYEDGE EVERYSECONDEDGE RISING FALLING
+TIMER.DTTIME.DTPRESC        DIV1-DIV1024
+TIMER.DTFC.DTFA             NONE INACTIVE CLEAR TRISTATE
+LETIMER.CTRL.REPMODE        FREE ONESHOT BUFFERED DOUBLE
+LETIMER.CTRL.UFOA?          NONE TOGGLE PULSE PWM
+BURTC.CTRL.MODE             DISABLE EM2EN EM3EN EM4EN
+BURTC.CTRL.LPCOMP           IGN0LSB IGN1LSB IGN2LSB IGN3LSB IGN4LSB IGN5LSB IGN6LSB IGN7LSB
+BURTC.CTRL.PRESC            DIV1-DIV128
+BURTC.CTRL.CLKSEL           NONE LFRCO LFXO ULFRCO
+BURTC.LPMODE.LPMODE         DISABLE ENABLE BUEN
+BURTC.LFXOFDET.OSC          DISABLE LFRCO ULFRCO
+PCNT.CTRL.MODE              DISABLE OVSSINGLE EXTCLKSINGLE EXTCLKQUAD
+PCNT.CTRL.CNTDIR            UP DOWN
+PCNT.CTRL.EDGE              POS NEG
+PCNT.CTRL.CNTEV             BOTH UP DOWN NONE
+PCNT.CTRL.AUXCNTEV          NONE UP DOWN BOTH
+ADC.CTRL.WARMUPMODE         NORMAL FASTBG KEEPSCANREFWARM KEEPADCWARM
+ADC.CTRL.LPFMODE            BYPASS DECAP RCFILT
+ADC.CTRL.OVSRSEL            X2-X4096
+ADC.S*CTRL.RES              12BIT 8BIT 6BIT OVS
+ADC.S*CTRL.REF              1V25 2V5 VDD 5VDIFF EXTSINGLE 2XEXTDIFF 2XVDD
+ADC.S*CTRL.ADJ              RIGHT LEFT
+ADC.S*CTRL.AT               1CYCLE 2CYCLES 4CYCLES 8CYCLES 16CYCLES 32CYCLES 64CYCLES 128CYCLES
++   256CYCLES
+ADC.SINGLECTRL.INPUTSEL     CH0 CH1 CH2 CH3 CH4 CH5 CH6 CH7 TEMP VDDDIV3 VDD VSS VREFDIV2 DAC0OUT0
++   DAC0OUT1
+DAC.CTRL.CONVMODE           CONTINUOUS SAMPLEHOLD SAMPLEOFF
+DAC.CTRL.OUTMODE            DISABLE PIN ADC PINADC
+DAC.CTRL.REFSEL             1V25 2V5 VDD
+DAC.CTRL.PRESC              DIV1-DIV128
+DAC.CTRL.REFRSEL            8CYCLES 16CYCLES 32CYCLES 64CYCLES
+ACMP.CTRL.HYSTSEL           HYST0 HYST1 HYST2 HYST3 HYST4 HYST5 HYST6 HYST7
+[AV]CMP.CTRL.WARMTIME          4CYCLES 8CYCLES 16CYCLES 32CYCLES 64CYCLES 128CYCLES 256CYCLES
++   512CYCLES
+ACMP.INPUTSEL.POSSEL        CH0 CH1 CH2 CH3 CH4 CH5 CH6 CH7
+ACMP.INPUTSEL.NEGSEL        CH0 CH1 CH2 CH3 CH4 CH5 CH6 CH7 1V25 2V5 VDD CAPSENSE DAC0CH0 DAC0CH1
+ACMP.INPUTSEL.CSRESSEL      RES0 RES1 RES2 RES3
+LESENSE.CTRL.SCANMODE       PERIODIC ONESHOT PRS
+LESENSE.CTRL.SCANCONF       DIRMAP INVMAP TOGGLE DECDEF
+LESENSE.CTRL.ALTEXMAP       ALTEX ACMP
+LESENSE.CTRL.BUFIDL         HALFFULL FULL
+LESENSE.CTRL.DMAWU          DISABLE BUFDATAV BUFLEVEL
+LESENSE.TIMCTRL.AUXPRESC    DIV1-DIV8
+LESENSE.TIMCTRL.?[FC]PRESC  DIV1-DIV128
+LESENSE.PERCTRL.DACCH?DATA  DACDATA ACMPTHRES
+LESENSE.PERCTRL.DACCH?CONV  DISABLE CONTINUOUS SAMPLEHOLD SAMPLEOFF
+LESENSE.PERCTRL.DACCH?OUT   DISABLE PIN ADCACMP PINADCACMP
+LESENSE.PERCTRL.DACREF      VDD BANDGAP
+LESENSE.PERCTRL.ACMP?MODE   DISABLE MUX MUXTHRES
+LESENSE.PERCTRL.WARMUPMODE  NORMAL KEEPACMPWARM KEEPDACWARM KEEPACMPDACWARM
+LESENSE.DECCTRL.INPUT       SENSORSTATE PRS
+LESENSE.BIASCTRL.BIASMODE   DUTYCYCLE HIGHACC DONTTOUCH
+LESENSE.IDLECONF.*          DISABLE HIGH LOW DACCH
+LESENSE.ALTEXCONF.IDLECONF? DISABLE HIGH LOW
+LESENSE.ST*.PRSACT          NONE PRS0 PRS1 PRS01 PRS2 PRS02 PRS12 PRS012
+LESENSE.CH*.SAMPLE          COUNTER ACMP
+LESENSE.CH*.SETIF           NONE LEVEL POSEDGE NEGEDGE
+LESENSE.CH*.EXMODE          DISABLE HIGH LOW DACOUT
+LESENSE.CH*.*CLK            LFACLK AUXHFRCO
+LESENSE.CH*_EVAL.COMP       LESS GE
+DMA.CH*.SOURCESEL           NONE 8:ADC0 10:DAC0 12:USART0 USART1 USART2 16:LEUART0 LEUART1 20:I2C0
++   I2C1 24:TIMER0 TIMER1 TIMER2 TIMER3 44:UART0 UART1 48:MSC AES LESENSE EBI
+DMA.STATUS.STATE            IDLE RDCHCTRLDATA RDSRCENDPTR RDDSTENDPTR RDSRCDATA WRDSTDATA
++   WAITREQCLR WRCHCTRLDATA STALLED DONE PERSCATTRANS
+*.*.*PRSSEL*                PRSCH0 PRSCH1 PRSCH2 PRSCH3 PRSCH4 PRSCH5 PRSCH6 PRSCH7 PRSCH8 PRSCH9
++   PRSCH10 PRSCH11
+"""
+
+
+Values = tuple[tuple[int, str], ...]
+
+
+def with_values(layouts: Iterable[Layout]) -> tuple[Layout, ...]:
+    """The layouts with the names of their fields' values.
+
+    RegisterTableError if a field has more names than values.
+    """
+    return tuple(_named(layout) for layout in layouts)
+
+
+def value_names() -> Iterator[tuple[str, Values]]:
+    """The lines of the table: pattern, and the values with their names."""
+    for line in re.sub(r"\n\+", "", _TABLE).split("\n"):
+        if line:
+            pattern, *words = line.split()
+            yield pattern, tuple(_values(words))
+
+
+def _values(words: Iterable[str]) -> Iterator[tuple[int, str]]:
+    number = 0
+    for word in words:
+        at, colon, name = word.rpartition(":")
+        number = int(at) if colon else number
+        names = [name]
+        if powers := re.fullmatch(r"(\D+)(\d+)-\1(\d+)", name):
+            first, last = int(powers[2]).bit_length(), int(powers[3]).bit_length()
+            names = [f"{powers[1]}{1 << n}" for n in range(first - 1, last)]
+        for one in names:
+            if one != "-":
+                yield number, one
+            number += 1
+
+
+def _named(layout: Layout) -> Layout:
+    prefix = f"{layout.name}."
+    lines = [
+        (pattern.partition(".")[2], values)
+        for pattern, values in value_names()
+        if fnmatchcase(prefix, pattern.partition(".")[0] + ".")
+    ]
+
+    def named(register: str, field: RegisterField) -> RegisterField:
+        if register == "ROUTE" and field.name == "LOCATION":
+            return replace(field, values=_locations(layout))
+        name = f"{register}.{field.name}"
+        values = next((values for pattern, values in lines if fnmatchcase(name, pattern)), ())
+        if "PRSSEL" in name:  # a narrow one selects from the first channels
+            values = values[: 1 << field.width]
+        if any(number >> field.width for number, _ in values):
+            raise RegisterTableError(f"{prefix}{name}: more values than {field.width} bits hold")
+        return replace(field, values=values) if values else field
+
+    registers = tuple(
+        replace(one, fields=tuple(named(one.name, field) for field in one.fields))
+        for one in layout.registers
+    )
+    return replace(layout, registers=registers)
+
+
+def _locations(layout: Layout) -> Values:
+    """The locations at which any of the layout's signals has a pin."""
+    units = [instance.name for instance in layout.instances]
+    counts = [len(pins) for signal, pins in ROUTES.items() if signal.rpartition("_")[0] in units]
+    return tuple((n, f"LOC{n}") for n in range(max(counts, default=0)))
