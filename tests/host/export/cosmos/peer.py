@@ -18,7 +18,7 @@ from openc3.top_level import get_class_from_module
 from openc3.utilities.string import filename_to_class_name, filename_to_module
 
 BUSY_S = 30.0
-ANSWER_S = 0.1  # after the protocol has had it
+ANSWER_S = 0.5  # after the protocol has had it
 STREAM_S = 10.0
 STREAMED = 20
 
@@ -106,15 +106,23 @@ def talk(plugin, commands):
 
     threading.Thread(target=listen, daemon=True).start()
 
+    def answer_to(identifier):
+        try:
+            while True:  # others are of a stream, or came late
+                found = packets.get(timeout=ANSWER_S)
+                first, second = bytes.fromhex(found["data"])[:2]
+                if identifier == (first or second):
+                    return found
+        except queue.Empty:
+            return None
+
     def ask(name, values):
         until = time.monotonic() + BUSY_S
         while time.monotonic() < until:  # it may be resetting, or its buffer be full
-            interface.write(plugin.command(name, values))
-            try:
-                answer = packets.get(timeout=ANSWER_S)
-            except queue.Empty:
-                continue
-            if answer["values"].get("ERROR") != "BUFFER_FULL":
+            packet = plugin.command(name, values)
+            interface.write(packet)
+            answer = answer_to(packet.buffer[0])
+            if answer is not None and answer["values"].get("ERROR") != "BUFFER_FULL":
                 return answer
         return None
 

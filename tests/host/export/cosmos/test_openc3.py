@@ -63,6 +63,13 @@ def test_commands_equal_our_codec(plugin: Plugin, count: int) -> None:
         assert data == (bytes([message.id]) + message.pack(**values)).hex(), (message.name, values)
 
 
+def test_defaults_are_the_reset_values(plugin: Plugin) -> None:
+    telecommands = plugin.interface.telecommands
+    theirs = plugin.ask("pack", [(one.name.upper(), {}) for one in telecommands])
+    for message, data in zip(telecommands, theirs, strict=True):
+        assert data == (bytes([message.id]) + message.pack(**message.reset_values())).hex()
+
+
 @COUNTS
 def test_packets_are_told_apart_and_decode_as_ours(plugin: Plugin, count: int) -> None:
     told = [(one, *frame) for one in answers(plugin.interface) for frame in frames(one, count)]
@@ -71,6 +78,7 @@ def test_packets_are_told_apart_and_decode_as_ours(plugin: Plugin, count: int) -
         _check(message, found, values)
 
 
+@pytest.mark.slow
 def test_interface_reads_all_telemetry_and_sends_all_telecommands(plugin: Plugin) -> None:
     interface = plugin.interface
     # A stream last: its frames come as they are ready.
@@ -94,6 +102,7 @@ def test_interface_reads_all_telemetry_and_sends_all_telecommands(plugin: Plugin
     assert len(found["stream"]) == 20 * telecommands[-1].name.startswith("Stream")
 
 
+@pytest.mark.slow
 def test_tcp_interface_reads_from_a_port(tmp_path: Path) -> None:
     interface = device("cubesense").interface
     with emulating(["cubesense", "--tcp", "0", "--pace", "fast"]) as said:
