@@ -19,7 +19,7 @@ NEEDS_OPENC3 = pytest.mark.skipif(
     VARIABLE not in os.environ, reason=f"{VARIABLE} names no Python with openc3"
 )
 
-TIMEOUT_S = 300
+TIMEOUT_S = 900
 
 
 def write_plugin(interface: Interface, folder: Path, **variables: str) -> None:
