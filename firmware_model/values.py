@@ -58,6 +58,11 @@ def _flag(given: str) -> bool:
     return {"true": True, "false": False}[given.lower()]
 
 
+def _seconds(given: str) -> float:
+    number = given.rstrip("smu ")
+    return float(number) * {"s": 1.0, "ms": 1e-3, "us": 1e-6, "": 1.0}[given[len(number) :].strip()]
+
+
 def _kind(name: str, what: str, own: type[Any], parse: Callable[[str], Any]) -> ValueKind:
     def read(given: Any) -> Any:
         if not isinstance(given, own):
@@ -68,6 +73,7 @@ def _kind(name: str, what: str, own: type[Any], parse: Callable[[str], Any]) -> 
 
 
 NUMBER = ValueKind("number", "a number", _number, float)
+DURATION = ValueKind("number", "a time such as 5s or 200ms", _number, _seconds)
 WHOLE = ValueKind("whole", "a whole number", _whole, _integer)
 FLAG = _kind("flag", "true or false", bool, _flag)
 TEXT = _kind("text", "text", str, str)
@@ -268,6 +274,7 @@ def declare(
 
 # Each takes (default, meaning), then (low, high, unit) for numbers, then keywords of `Declaration`.
 number: Callable[..., Any] = partial(declare, NUMBER)
+duration: Callable[..., Any] = partial(declare, DURATION, low=0, unit="s", exclusive=True)
 whole: Callable[..., Any] = partial(declare, WHOLE)
 flag: Callable[..., Any] = partial(declare, FLAG)
 text: Callable[..., Any] = partial(declare, TEXT)

@@ -88,8 +88,8 @@ class OwnFirmwareBoard(Board):
             if line.name == route.block or {route.tx, route.rx} & {wire.tx, wire.rx}:
                 raise ValueError(f"serial {route}: {line.name} is led out already; leave one out")
         wire = SerialWire(self.processor, route.tx, route.rx, follows=True)
-        line = {"name": route.block, "title": str(route), "place": route.place}
-        self._connect(wire, baud, suffix=f".{route.block}" if self.lines else "", **line)
+        names = {"name": route.block, "title": str(route), "place": route.place}
+        self._connect(wire, baud, suffix=f".{route.block}" if self.lines else "", **names)
 
     def _sent(self, one: Outgoing) -> None:
         for wire in self._wires:

@@ -11,6 +11,7 @@ examples:
   cubestack emulate {second} --pty ./tty --record session.jsonl
   cubestack emulate {first} {second} {third} --i2c 7
       then: cubestack run --attach -- i2cdetect -y 7
+  cubestack emulate efm32gg --firmware app.elf --serial uart0@PE0,PE1:./tty
   cubestack emulate {first} --control 8700     pause, step, faults by HTTP
 """
 
@@ -30,9 +31,10 @@ from cubestack.emulator.ports.control import ControlPort
 from cubestack.emulator.ports.endpoint import Lifeline
 from cubestack.emulator.ports.serial_port import SerialPort
 from cubestack.emulator.scene.orbit_file import load_orbit
+from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.formats.i2c_socket import socket_path
 from cubestack.firmware_model.formats.setup import Setup
-from cubestack.firmware_model.values import whole
+from cubestack.firmware_model.values import duration, whole
 from cubestack.host.cli import device_options
 from cubestack.host.cli.arguments import add_path, add_value
 from cubestack.host.cli.ports import LAST_PORT, add_port_arguments, check_linux, open_ports
@@ -53,7 +55,10 @@ ONE_DEVICE = (
 )
 """Options that belong to one device."""
 
-FORWARD_ONLY = ("trace", "gdb", "profile_out", "coverage_out", "orbit")
+TIMED_OUT = 1
+"""Exit status after the time-out."""
+
+FORWARD_ONLY = ("trace", "gdb", "profile_out", "coverage_out", "orbit", "timeout")
 """Options whose effects can't be undone, so going back in time is off."""
 
 Served = Sequence[tuple[AnyEmulated, SerialLine, SerialPort]]
@@ -88,6 +93,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="real",
         help="real: virtual time follows wall time; fast: as fast as possible",
     )
+    timeout = duration(None, "end after this virtual time, such as 5s, with exit status 1")
+    add_value(parser, "timeout", timeout)
     add_value(
         parser,
         "control",
@@ -105,7 +112,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Serve until SIGINT or SIGTERM, or without gdb until a program exits; returns its status."""
+    """Serve until SIGINT, SIGTERM or the time-out, or without gdb until a program exits.
+
+    Returns the program's status, or ``TIMED_OUT`` after the time-out.
+    """
     ended: list[int] = []
     _check(args)
     with ExitStack() as stack:
@@ -135,7 +145,7 @@ def run(args: argparse.Namespace) -> int:
                     *(endpoint for _, _, endpoint in served),
                     *(one for one in (gdb, control, lifeline) if one),
                 ],
-                lambda: any(one.board.busy() for one in opened),
+                lambda: args.timeout is not None or any(one.board.busy() for one in opened),
                 pace=args.pace,
                 i2c=adapter if i2c_ports else None,
                 i2c_ports=i2c_ports,
@@ -153,6 +163,18 @@ def run(args: argparse.Namespace) -> int:
             ended.append(exit_status(status))
             if args.gdb is None:  # else a debugger can look at the program, or restart it
                 scheduler.stop()
+
+        def timed_out(_event: object) -> None:
+            if ended and args.gdb is None:
+                return  # just before
+            say(f"time-out: {args.timeout:g} s of virtual time have passed")
+            board.kernel.hold("time-out")
+            ended.append(TIMED_OUT)
+            scheduler.stop()
+
+        if args.timeout is not None:
+            end = board.kernel.timeout(round(args.timeout * PS_PER_S))
+            end.callbacks.append(timed_out)
 
         def connect(emulated: AnyEmulated) -> None:
             _report_events(emulated)

@@ -88,6 +88,8 @@ class EmulatedControls:
                 self.point(words)
             case ("power", channel, "on" | "off" as state):
                 self.switch(channel, state == "on")
+            case ("pin", pin, "0" | "1" | "z" as level):
+                self.drive(pin, None if level == "z" else int(level))
             case _:
                 raise TargetError(f"nothing does {' '.join(control.words)!r}")
 
@@ -124,6 +126,15 @@ class EmulatedControls:
             raise TargetError(f"no channel {channel!r}; known: {', '.join(self.channels)}")
         self._board.power.switch(channel, on)
         self._emulated.on_act(("power", channel, "on" if on else "off"), "")
+
+    def drive(self, pin: str, level: int | None) -> None:
+        """Drive a pin of a bare part from outside; None releases it."""
+        pins = self._emulated.pins
+        if level is None:
+            del pins[pin]
+        else:
+            pins[pin] = level
+        self.on_act(("pin", pin, "z" if level is None else str(level)), "")
 
     def peek(self, what: str) -> dict[str, tuple[int | None, str]]:
         from cubestack.emulator.boards.monitor import peek

@@ -29,6 +29,7 @@ from cubestack.host.clients.node import NodeClient
 from cubestack.host.devices.device import AnyDevice, BoardT_co, ClientT_co, Device, Engine
 from cubestack.host.devices.registry import device as registered
 from cubestack.host.devices.registry import devices, emulated_names
+from cubestack.host.emulation.firmware import ProgramExit, run_to_exit
 from cubestack.host.emulation.virtual_serial import PS_PER_S, VirtualSerial
 from cubestack.host.terminal import busy
 from cubestack.host.transport.smbus import CubeSMBus
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from cubestack.emulator.boards.contract import Board
+    from cubestack.emulator.boards.pins import Pins
     from cubestack.emulator.faults.injector import Faults
     from cubestack.emulator.ports.realtime import RealtimeScheduler
     from cubestack.emulator.scene.pointing import Pointing
@@ -144,6 +146,20 @@ class EmulatedDevice(Closable, Generic[BoardT_co, ClientT_co]):
             raise ValueError(f"{name} cannot be pointed: its {type(scene).__name__} has no pointed")
         self.board.scene = pointed(pointing, self.time_s)
         self.on_act(("point", *pointing.words()), "")
+
+    @property
+    def pins(self) -> Pins:
+        """Port pins by name; ValueError for a device whose pins are connected to other parts."""
+        if self.board.pins is None:
+            raise ValueError(f"the pins of {self.device.name} are not free; use a bare part")
+        return self.board.pins
+
+    def run_to_exit(self, timeout_s: float = 10.0) -> ProgramExit:
+        """Let virtual time pass until its own firmware exits by semihosting.
+
+        Raises TimeoutError, with what the program printed, if it does not exit in time.
+        """
+        return run_to_exit(self.board, timeout_s)
 
     # --- ports ----------------------------------------------------------------------------------
 

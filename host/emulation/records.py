@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
@@ -51,6 +52,12 @@ def start_trace(emulated: AnyEmulated, stream: IO[str]) -> VcdTrace:
         None if board.insight is None else board.insight.history,
     )
     trace.listen(board.i2c_bus)
+    if board.pins is not None:
+        for pin in board.pins:
+            trace.declare(f"pins.{pin}", 1, board.pins.driven(pin))
+        board.pins.listeners.append(
+            lambda at_ps, pin, level: trace.put(at_ps, f"pins.{pin}", level)
+        )
     return trace
 
 
@@ -87,8 +94,11 @@ class InsightFiles:
             observers.append(own_firmware(emulated, "--profile-out and --coverage-out").observer)
 
         def write_all() -> None:
-            if observers:
-                first, *others = observers
+            by_program: dict[Any, list[Observer]] = defaultdict(list)
+            for observer in observers:
+                image = observer.machine.image
+                by_program[image.segments if image else ()].append(observer)
+            for first, *others in by_program.values():
                 for other in others:
                     first.add(other)
                 for stream, write in outputs:

@@ -159,6 +159,7 @@ CALLS = (
     ),
     Call("GET", "/devices/{device}/pictures", "images in its memories", Emulation.pictures),
     Call("GET", "/devices/{device}/pictures/{name}", "an image, as PNG", Emulation.picture),
+    Call("GET", "/devices/{device}/pins", "levels at the pins of a bare part", Emulation.pins),
     Call("GET", "/devices/{device}/recording", "recording of its ports", Emulation.recording),
     Call(
         *("GET", "/devices/{device}/trace", "VCD file of a past time span"),
@@ -184,7 +185,7 @@ CALLS = (
         {"mag_limit": (NUMBER, 4.0), "epoch": (NUMBER, 2026.0)},
     ),
     Call(
-        *("POST", "/devices/{device}/act", "the shell's commands fault, scene, point, power"),
+        *("POST", "/devices/{device}/act", "the shell's commands fault, scene, point, power, pin"),
         _act,
         {"words": (list, REQUIRED), "text": (str, "")},
     ),

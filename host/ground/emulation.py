@@ -125,6 +125,11 @@ class Emulation:
             raise TargetError(f"no image {name!r}; known: {', '.join(pictures) or 'none'}")
         return pictures[name].copy()
 
+    def pins(self, device: str) -> JsonObject:
+        """Level of each pin, and what the firmware drives there; ValueError for connected pins."""
+        pins = self.of(device).pins
+        return {"pins": {pin: {"level": pins[pin], "output": pins.output(pin)} for pin in pins}}
+
     def act(self, device: str, words: Sequence[str], text: str = "") -> None:
         """Execute a shell command; ``text`` is the content of the file that it names.
 

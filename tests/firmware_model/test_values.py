@@ -24,6 +24,7 @@ from cubestack.firmware_model.values import (
     ListDeclaration,
     choice,
     described,
+    duration,
     flag,
     number,
     positive,
@@ -162,6 +163,22 @@ for path in sorted(one for part in PACKAGES for one in (ROOT / part).rglob("*.py
     if "firmware_model.values import" in path.read_text(encoding="utf-8"):
         name = ".".join(path.relative_to(ROOT).with_suffix("").parts)
         import_module(f"cubestack.{name.removesuffix('.__init__')}")
+
+
+@pytest.mark.parametrize(
+    ("given", "seconds"),
+    [("5s", 5.0), ("5", 5.0), ("200ms", 0.2), ("1.5 s", 1.5), ("30us", 3e-5), ("1e-3", 1e-3)],
+)
+def test_durations_have_a_unit_or_are_seconds(given: str, seconds: float) -> None:
+    assert duration(None, "").parse(given) == pytest.approx(seconds, rel=1e-12)
+
+
+@pytest.mark.parametrize("given", ["5x", "s", "", "5 sm", "5ss", "m", "1h", "ms5"])
+def test_other_durations_are_refused(given: str) -> None:
+    with pytest.raises(ValueError, match=r"^must be a time such as 5s or 200ms, not '"):
+        duration(None, "").parse(given)
+
+
 OWNERS = sorted(set(owners()), key=lambda one: (one.__module__, one.__name__))
 
 

@@ -98,7 +98,7 @@ def write_lcov(observer: Observer, stream: IO[str]) -> None:
     """Write execution counts of source lines as lcov's tracefile (geninfo(1)).
 
     The count of a line is that of the first instruction of its most frequent statement. A program
-    without a line table has none.
+    without a line table is one file, whose functions have their addresses as line numbers.
     """
     symbols = observer.symbols
     lines: dict[str, dict[int, int]] = defaultdict(dict)
@@ -108,10 +108,14 @@ def write_lcov(observer: Observer, stream: IO[str]) -> None:
             found[row.number] = max(found.get(row.number, 0), observer.count_of(row.address))
     functions: dict[str, list[tuple[int, str, int]]] = defaultdict(list)
     for function in symbols.functions:
-        line = symbols.line_at(function.address)
+        line, count = symbols.line_at(function.address), observer.count_of(function.address)
         if line is not None:
-            count = observer.count_of(function.address)
             functions[line.file].append((line.number, function.name, count))
+        elif not symbols.rows:
+            image = observer.machine.image
+            file = str(image.path) if image and image.path else "firmware"
+            functions[file].append((function.address, function.name, count))
+            lines[file][function.address] = count
     for file in sorted(lines):
         stream.write(f"TN:\nSF:{file}\n")
         called = sorted(functions[file])

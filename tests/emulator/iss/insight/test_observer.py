@@ -152,6 +152,23 @@ def test_lcov_output_has_line_and_function_counts(observer: Observer, symbols: S
     assert f"DA:{number},0\n" in text
 
 
+def test_lcov_output_of_a_program_without_lines_has_functions_by_address(
+    machine: Machine, program: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bare = Symbols(program.read_bytes())
+    monkeypatch.setattr(Symbols, "_read_lines", lambda _symbols: ())
+    observer = Observer(machine, bare)
+    run(machine, RUN_PS)
+    stream = io.StringIO()
+    write_lcov(observer, stream)
+    work, works = address(observer, "work"), calls(observer, "work").count
+    (record,) = stream.getvalue().split("end_of_record\n")[:-1]
+    assert f"FN:{work},work\n" in record
+    assert f"FNDA:{works},work\n" in record
+    assert f"DA:{work},{works}\n" in record
+    assert f"DA:{address(observer, 'crash')},0\n" in record
+
+
 def test_history_has_functions_and_exceptions_with_their_times(
     machine: Machine, symbols: Symbols
 ) -> None:
