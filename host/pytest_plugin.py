@@ -15,7 +15,7 @@ test prints the fault events.
 """
 
 from argparse import ArgumentTypeError
-from contextlib import nullcontext
+from contextlib import ExitStack, nullcontext
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -28,11 +28,12 @@ from cubestack.host.devices.registry import devices, emulated_names
 from cubestack.host.emulation.virtual_clock import VirtualClock
 
 if TYPE_CHECKING:
-    from collections.abc import Generator, Iterator
+    from collections.abc import Callable, Generator, Iterator
 
     from cubestack.host.emulation.emulated import AnyEmulated
 
 MARKER = "cubestack"
+COVERAGE = "cubestack-coverage"
 KEYS = ("scene", "seed", "faults", "wall_time")
 LINES_SHOWN = 40
 
@@ -69,6 +70,35 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         action="store_true",
         help="keep wall time in drivers (default: their sleeps and clocks are virtual)",
     )
+    group.addoption(
+        "--cubestack-coverage",
+        type=Path,
+        metavar="FILE",
+        help="executed lines of own firmware in all tests, as an lcov file; a worker of "
+        "pytest-xdist adds its name to FILE",
+    )
+
+
+class _Coverage:
+    """Collects the coverage of the session's devices; the file is opened for the first of them."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._stack = ExitStack()
+        self._watch: Callable[[AnyEmulated], None] | None = None
+
+    def watch(self, opened: "AnyEmulated") -> None:
+        from cubestack.host.emulation.records import InsightFiles
+
+        if opened.board.insight is None:
+            return
+        if self._watch is None:
+            self._watch = InsightFiles(coverage=self._path).open(self._stack)
+        self._watch(opened)
+
+    def pytest_unconfigure(self) -> None:
+        """Write the file."""
+        self._stack.close()
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -81,6 +111,12 @@ def pytest_configure(config: pytest.Config) -> None:
     for name in emulated_names():
         setattr(fixtures, name, _fixture(name))
     config.pluginmanager.register(fixtures, "cubestack-fixtures")
+    path = config.getoption("--cubestack-coverage")
+    if path is not None:
+        worker = getattr(config, "workerinput", {}).get("workerid")
+        config.pluginmanager.register(
+            _Coverage(path.with_name(f"{path.name}.{worker}") if worker else path), COVERAGE
+        )
 
 
 def _fixture(name: str) -> Any:
@@ -100,6 +136,9 @@ def _fixture(name: str) -> Any:
         seed = options.get("seed", config.getoption("--cubestack-seed"))
         engine: Engine = config.getoption("--cubestack-engine") if own.has_fpga else "auto"
         with open_device(name, options.get("scene"), seed=seed, engine=engine, **board) as opened:
+            coverage = config.pluginmanager.get_plugin(COVERAGE)
+            if coverage is not None:
+                coverage.watch(opened)
             plan = options.get("faults")
             if plan is not None:
                 text = isinstance(plan, str) and ("\n" in plan or "=" in plan)

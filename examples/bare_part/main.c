@@ -1,4 +1,5 @@
-// For the starter kit: button 0 (PB9, low when pressed) switches LED 0 (PE2), and UART0 reports it.
+// For the starter kit: button 0 (PB9, low when pressed) switches LED 0 (PE2), and UART0 reports it, and
+// whenever it receives a question mark.
 #include "debounce.h"
 #include "processor.h" // from `cubestack export efm32gg --format processor-c`
 
@@ -37,9 +38,11 @@ int main(void) {
         const uint32_t now = ticks;
         while (now == ticks)
             __asm volatile("wfi");
-        if (debounce(&button, !(GPIO->PB_DIN >> BUTTON & 1u))) {
+        const bool pressed = debounce(&button, !(GPIO->PB_DIN >> BUTTON & 1u));
+        if (pressed)
             GPIO->PE_DOUTTGL = 1u << LED;
+        const bool asked = UART0->STATUS & USART_STATUS_RXDATAV && UART0->RXDATA == '?';
+        if (pressed || asked)
             put(GPIO->PE_DOUT >> LED & 1u ? "on\n" : "off\n");
-        }
     }
 }

@@ -134,7 +134,7 @@ class EmulatedControls:
             del pins[pin]
         else:
             pins[pin] = level
-        self.on_act(("pin", pin, "z" if level is None else str(level)), "")
+        self._emulated.on_act(("pin", pin, "z" if level is None else str(level)), "")
 
     def peek(self, what: str) -> dict[str, tuple[int | None, str]]:
         from cubestack.emulator.boards.monitor import peek

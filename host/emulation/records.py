@@ -83,7 +83,7 @@ class InsightFiles:
         """
         from cubestack.emulator.iss.insight.reports import write_callgrind, write_lcov
 
-        observers: list[Observer] = []
+        by_program: dict[Any, list[Observer]] = defaultdict(list)
         outputs: list[tuple[IO[str], Any]] = [
             (create_file(path, stack), write)
             for path, write in ((self.profile, write_callgrind), (self.coverage, write_lcov))
@@ -91,23 +91,30 @@ class InsightFiles:
         ]
 
         def watch(emulated: AnyEmulated) -> None:
-            observers.append(own_firmware(emulated, "--profile-out and --coverage-out").observer)
+            observer = own_firmware(emulated, "--profile-out and --coverage-out").observer
+            image = observer.machine.image
+            observers = by_program[image.segments if image else ()]
+            _merge(observers)  # each has counters of all memories
+            observers.append(observer)
 
         def write_all() -> None:
-            by_program: dict[Any, list[Observer]] = defaultdict(list)
-            for observer in observers:
-                image = observer.machine.image
-                by_program[image.segments if image else ()].append(observer)
-            for first, *others in by_program.values():
-                for other in others:
-                    first.add(other)
+            for observers in by_program.values():
+                _merge(observers)
                 for stream, write in outputs:
-                    write(first, stream)
+                    write(observers[0], stream)
 
         if outputs:
             stack.callback(write_all)
             return watch
         return lambda _emulated: None
+
+
+def _merge(observers: list[Observer]) -> None:
+    """Add those that have ended to the first one."""
+    for other in observers[1:]:
+        if observers[0].closed and other.closed:
+            observers[0].add(other)
+            observers.remove(other)
 
 
 def own_firmware(emulated: AnyEmulated, what: str) -> Any:

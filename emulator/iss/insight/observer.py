@@ -112,6 +112,10 @@ class Observer:
             mine.counts += its.counts
         self._found += other._found
 
+    @property
+    def closed(self) -> bool:
+        return self._handle is None
+
     def close(self) -> None:
         """End the observation; the counts stay."""
         if self._handle is not None:

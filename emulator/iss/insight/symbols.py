@@ -12,6 +12,7 @@ from io import BytesIO
 from typing import Any, TypeVar
 
 from elftools.dwarf.callframe import FDE
+from elftools.elf.constants import SH_FLAGS
 from elftools.elf.elffile import ELFFile
 from elftools.elf.sections import SymbolTableSection
 
@@ -154,7 +155,7 @@ class Symbols:
         file = ELFFile(BytesIO(self._elf))
         if not file.has_dwarf_info():
             return
-        dwarf = file.get_dwarf_info()
+        dwarf, code = file.get_dwarf_info(), _code(file)
         for unit in dwarf.iter_CUs():
             program = dwarf.line_program_for_CU(unit)
             if program is None:
@@ -168,8 +169,11 @@ class Symbols:
                 state = entry.state
                 if state is None:
                     continue
-                if before is None:  # code that the linker discarded begins at address 0
-                    linked = self.function_at(state.address) is not None
+                if before is None:
+                    start = state.address  # 0 of code that the linker discarded
+                    linked = self.function_at(start) is not None or (
+                        start > 0 and any(start in section for section in code)
+                    )  # the latter of a weak function that another one replaces
                 elif linked:
                     file_name, statement = names.get(before.file, "?"), bool(before.is_stmt)
                     yield Line(before.address, state.address, file_name, before.line, statement)
@@ -180,6 +184,12 @@ def _containing(items: list[_Range], starts: list[int], address: int) -> _Range 
     """The item that contains the address, of items sorted by their starts."""
     index = bisect_right(starts, address) - 1
     return items[index] if index >= 0 and address < items[index].end else None
+
+
+def _code(file: ELFFile) -> list[range]:
+    """Addresses of the sections with instructions."""
+    sections = (one for one in file.iter_sections() if one["sh_flags"] & SH_FLAGS.SHF_EXECINSTR)
+    return [range(one["sh_addr"], one["sh_addr"] + one["sh_size"]) for one in sections]
 
 
 def _apart(functions: list[Symbol]) -> Iterator[Symbol]:

@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[3]
 BLOCK = re.compile(r"^( *)```([^\n]*)\n(.*?)^ *```$", re.MULTILINE | re.DOTALL)
 ENVIRONMENT = re.compile(r"[A-Z_]+=\S*")
 
-SERVES = r"^emulate\b|^ground\b"  # until Ctrl-C
+SERVES = r"^emulate\b(?!.* --timeout)|^ground\b"  # until Ctrl-C
 MAKES_PORT = r"^emulate\b"
 
 #: Commands that need something from the reader, and the reason.
@@ -66,7 +66,7 @@ def own_call(words: list[str]) -> str | None:
     """A `cubestack` command without its name, `&` and redirections; None for other commands."""
     if Path(words[0]).name != "cubestack":
         return None
-    return shlex.join(takewhile(lambda word: word not in ("|", ">", "&", "&&", ";"), words[1:]))
+    return shlex.join(takewhile(lambda word: word not in ("|", "||", ">", "&", "&&", ";"), words[1:]))
 
 
 def reader_files() -> dict[str, str]:

@@ -51,7 +51,7 @@ LONG_TARGETS = {
     "bench-engines",
     "libraries",
 }
-EMPTY_FOLDER = {"tutorial.md"}
+EMPTY_FOLDER = {"tutorial.md", "bare-part.md"}
 ENDING_S = 20.0
 TOLD = 15
 """Lines of what failed."""

@@ -54,7 +54,7 @@ def own() -> Iterator[tuple[str, str]]:
 OWN = sorted(set(own()))
 
 #: Programs that are not this project's, and what the documents do with them.
-OTHERS = {"pip", "python", "python3", "pytest", "curl", "dask", "echo", "exec", "printf", "head"}
+OTHERS = {"pip", "python", "python3", "pytest", "curl", "dask", "echo", "exec", "printf", "head", "cp"}
 OTHERS |= {"", "cd", "gdb-multiarch", "openFPGALoader"}  # the first one is `.`
 
 #: Commands that are parsed and not run here, and why.
@@ -62,6 +62,7 @@ NOT_HERE = LEFT | {
     SERVES: "serves until Ctrl-C",
     LONG: "minutes to hours",
     "^run --attach": "the bus of the command above it: tests/system/documents/pasted.py",
+    "^emulate efm32gg": "firmware that its page builds: test_bare_part.py",
     "--image out/": "a picture of make run: tests/system/documents/pasted.py",
 }
 
