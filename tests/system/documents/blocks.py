@@ -66,7 +66,8 @@ def own_call(words: list[str]) -> str | None:
     """A `cubestack` command without its name, `&` and redirections; None for other commands."""
     if Path(words[0]).name != "cubestack":
         return None
-    return shlex.join(takewhile(lambda word: word not in ("|", "||", ">", "&", "&&", ";"), words[1:]))
+    ends = "|", "||", ">", "&", "&&", ";"
+    return shlex.join(takewhile(lambda word: word not in ends, words[1:]))
 
 
 def reader_files() -> dict[str, str]:

@@ -54,8 +54,8 @@ def own() -> Iterator[tuple[str, str]]:
 OWN = sorted(set(own()))
 
 #: Programs that are not this project's, and what the documents do with them.
-OTHERS = {"pip", "python", "python3", "pytest", "curl", "dask", "echo", "exec", "printf", "head", "cp"}
-OTHERS |= {"", "cd", "gdb-multiarch", "openFPGALoader"}  # the first one is `.`
+OTHERS = {"pip", "python", "python3", "pytest", "curl", "dask", "echo", "exec", "printf", "head"}
+OTHERS |= {"", "cd", "cp", "gdb-multiarch", "openFPGALoader"}  # the first one is `.`
 
 #: Commands that are parsed and not run here, and why.
 NOT_HERE = LEFT | {
