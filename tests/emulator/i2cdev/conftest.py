@@ -2,14 +2,20 @@
 
 import socket
 import struct
-from collections.abc import Callable, Iterator
+import subprocess
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import Literal
 
 import pytest
 
 from cubestack.emulator.bus.i2c import I2cBus
 from cubestack.emulator.i2cdev.adapter import I2cAdapter
+from cubestack.emulator.i2cdev.guest_process import Route, RouteError, Streams
 from cubestack.emulator.i2cdev.pacing import wait_precisely
+from cubestack.emulator.i2cdev.preload.shim import find_c_compiler
+from cubestack.emulator.i2cdev.running import emulated_bus, run_program
 from cubestack.emulator.i2cdev.server import I2cServer
 from cubestack.emulator.ports.endpoint import poll_now
 from cubestack.emulator.sim.virtual_time import Kernel
@@ -101,6 +107,52 @@ def packed(call: Call, body: bytes, key: int = 0) -> bytes:
 
 
 GREETING = packed(Call.HELLO, pack_hello())
+
+
+def build_guest(source: Path, folder: Path) -> Path:
+    """Compile a program in C; there must be a compiler."""
+    compiler = find_c_compiler()
+    assert compiler is not None
+    built = folder / source.stem
+    subprocess.run([*compiler, "-O1", source, "-o", built, "-lpthread"], check=True)
+    return built
+
+
+def run_guest(
+    route: Route,
+    command: Sequence[object],
+    *,
+    hz: int = 400_000,
+    pace: Literal["real", "fast"] = "fast",
+    timeout_s: float = 60.0,
+    streams: Streams | None = None,
+) -> tuple[int, str]:
+    """Exit status and output of a program on a bus with one target; skips without the route.
+
+    ``streams`` replace the file that receives the output.
+    """
+    kernel = Kernel()
+    bus = I2cBus(kernel, hz)
+    bus.attach(0x1A, Registers())
+    with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryFile("w+") as output:
+        path = Path(folder, "private", "bus")
+        opened = emulated_bus(kernel, lambda: False, I2cAdapter(kernel, bus), path)
+        try:
+            status = run_program(
+                [str(word) for word in command],
+                7,
+                opened,
+                pace=pace,
+                route=route,
+                streams=streams or (output.fileno(), None),
+                timeout_s=timeout_s,
+            )
+        except RouteError as error:
+            pytest.skip(str(error))
+        finally:
+            opened.port.close()
+        output.seek(0)
+        return status, output.read()
 
 
 class Client:
