@@ -23,6 +23,7 @@ LEFT = {
     r"^ground run\.rec": "a recording of such a port",
     r"program\.elf|picture\.elf": "firmware: tests/system/firmware/test_own_firmware.py",
     r"sky\.jpg|night/|bench/": "needs photographs",
+    r"qemu-system-arm|\./star_tracker": "programs of others: tests/system/serial_programs",
     r"flight": "the reader's flight software",
     r"binned:Binned": "in its folder: examples/own_gateware/tests",
     r"^run -- bash|my_script\.py|^hdl wave|^shell emulated:cubesense$": "the reader's turn",

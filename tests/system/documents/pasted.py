@@ -182,7 +182,7 @@ def left_out(line: str, folder: Path, *, long: bool) -> str:
         if not long and re.search(LONG, call):
             return "minutes to hours"
     typed = shlex.join(words)
-    readers = "PROGRAM", "my_script", "picture.elf", "./star", "glow-sensor", "dask"
+    readers = "PROGRAM", "my_script", "picture.elf", "./star", "glow-sensor", "dask", "--lg-env"
     if any(word in typed for word in readers):
         return "the reader's turn"
     return ""

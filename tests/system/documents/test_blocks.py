@@ -24,7 +24,7 @@ from tests.system.conftest import ROOT, Served
 
 from .blocks import BLOCKS, LEFT, LONG, SERVES, Code, lines_of, own_call, reader_files, words_of
 
-LANGUAGES = {"sh", "python", "toml", "yaml", "text", "csv"}
+LANGUAGES = {"c", "sh", "python", "toml", "yaml", "text", "csv"}
 #: Dialogues and register accesses of the protocol pages, whose own tests run them.
 LANGUAGES |= {"wire", "wire-sky", "registers", "py"}
 
@@ -56,6 +56,7 @@ OWN = sorted(set(own()))
 #: Programs that are not this project's, and what the documents do with them.
 OTHERS = {"pip", "python", "python3", "pytest", "curl", "dask", "echo", "exec", "printf", "head"}
 OTHERS |= {"", "cd", "cp", "gdb-multiarch", "openFPGALoader"}  # the first one is `.`
+OTHERS |= {"cc", "arm-none-eabi-gcc"}
 
 #: Commands that are parsed and not run here, and why.
 NOT_HERE = LEFT | {
