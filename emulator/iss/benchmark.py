@@ -9,6 +9,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -100,13 +101,13 @@ def run_load(machine: Machine, image: Image, end: int) -> float:
 
 
 def _run_on_unicorn(image: Image, end: int) -> tuple[float, int]:
-    import unicorn
-    from unicorn import arm_const
+    unicorn: Any = import_module("unicorn")  # an oracle of the benchmark's reader, without types
+    arm_const: Any = import_module("unicorn.arm_const")
 
     memory = bytearray(FLASH_BYTES)
     for address, data in image.segments:
         memory[address : address + len(data)] = data
-    oracle: Any = unicorn.Uc(unicorn.UC_ARCH_ARM, unicorn.UC_MODE_THUMB | unicorn.UC_MODE_MCLASS)
+    oracle = unicorn.Uc(unicorn.UC_ARCH_ARM, unicorn.UC_MODE_THUMB | unicorn.UC_MODE_MCLASS)
     oracle.ctl_set_cpu_model(arm_const.UC_CPU_ARM_CORTEX_M3)
     oracle.mem_map(0, FLASH_BYTES)
     oracle.mem_map(RAM_BASE, RAM_BYTES)

@@ -37,6 +37,6 @@ def build(name: str, folder: Path, rounds: int, optimization: str = "-O2") -> Pa
     files = (FOLDER / f"{name}.c", FOLDER / "start.c", "-T", FOLDER / "load.ld")
     if COMPILER is None:
         raise FileNotFoundError("arm-none-eabi-gcc is not installed (Debian: gcc-arm-none-eabi)")
-    command = [COMPILER, optimization, *FLAGS, *sizes, *files, "-o", target]
+    command = [COMPILER, optimization, *FLAGS, *sizes, *map(str, files), "-o", str(target)]
     subprocess.run(command, check=True, capture_output=True)
     return target

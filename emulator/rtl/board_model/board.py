@@ -60,7 +60,8 @@ class SimulatedBoards:
             CompilerError: there is no C++ compiler, or it failed.
             ValueError: ``count`` is more than a header allows.
         """
-        self.divider, self._handle = divider, None
+        self.divider = divider
+        self._handle: Any = None
         tools = (yosys_version().encode(),)
         build = partial(_compile, header, design)
         recipe = cache.recipe("a simulated board", header + design, _SOURCES, build, tools)
@@ -75,7 +76,7 @@ class SimulatedBoards:
         self.most = int(self._library.board_lanes())
         if not 1 <= count <= self.most:
             raise ValueError(f"{count} boards can not run side by side, 1 to {self.most} can")
-        self._handle: Any = self._library.board_new(divider)
+        self._handle = self._library.board_new(divider)
         self._lanes = (_Lane * count)()
         self._received = [ctypes.create_string_buffer(_ROOM) for _ in range(count)]
         for lane, buffer in zip(self._lanes, self._received, strict=True):

@@ -57,5 +57,5 @@ def check_design(wiring: Wiring, found: Identity, port: str) -> None:
     raise DevboardError(
         f"the board on {port} has the top {found.name} (design {found.design.hex()}), but this"
         f" device needs {type(component).__name__} (design {wanted.hex()}); write its bitstream:"
-        " `cubestack hdl board`"
+        " `cubestack hdl board` with --device and the options of the emulation"
     )

@@ -9,11 +9,12 @@ from cubestack.hdl.devboard.netlist.cells import Netlist, NetlistError
 
 
 def _lut_bit(netlist: Netlist, random: Random) -> str:
-    """Invert one bit of a table."""
+    """Invert one bit of a table, for levels that its inputs can have."""
     places = [n for n, lut in enumerate(netlist.luts) if _of_design(netlist, lut.output)]
     place = _choose(places, random)
     lut = netlist.luts[place]
-    bit = random.randrange(1 << len(lut.inputs))
+    open_inputs = sum(1 << n for n, net in enumerate(lut.inputs) if net is None)
+    bit = random.choice([n for n in range(1 << len(lut.inputs)) if not n & open_inputs])
     netlist.luts[place] = replace(lut, table=lut.table ^ 1 << bit)
     return f"bit {bit} of the table of {netlist.name(abs(lut.output))} is inverted"
 

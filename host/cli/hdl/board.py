@@ -2,8 +2,6 @@
 
 import argparse
 import json
-from collections.abc import Callable, Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,10 +10,13 @@ from cubestack.firmware_model.values import whole
 from cubestack.hdl.devboard.boards import BOARDS
 from cubestack.hdl.devboard.netlist import MUTANTS
 from cubestack.host.cli.arguments import Parser, add_flag, add_value
+from cubestack.host.cli.device_options import add_board_arguments, chosen_options, given_options
 from cubestack.host.cli.hdl import board_check
 from cubestack.host.cli.hdl.choice import one
+from cubestack.host.cli.hdl.design import fpga_wiring
 from cubestack.host.devices.registry import device as registered
 from cubestack.host.devices.registry import devices, merged_tables
+from cubestack.host.options import option_string
 from cubestack.host.terminal import busy, say, tell
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ Exit status 1 if the design does not fit or is too slow.
 
 examples:
   cubestack hdl board icebreaker --top TOP --out out/board
-  cubestack hdl board ulx3s --gateware design.v --device DEVICE --out out/board
+  cubestack hdl board ulx3s --device DEVICE --gateware design.v --out out/board
   cubestack hdl board icebreaker --top TOP --baud 1000000 --out out/board --json"""
 
 SIMULATE = """Run the placed netlist of a build behind a pseudo-terminal, in place of a board
@@ -45,8 +46,6 @@ examples:
   cubestack hdl board icebreaker --top TOP --baud 6000000 --out out/board
   cubestack hdl board simulate out/board
   cubestack hdl board simulate out/board --mutant lut-bit"""
-
-_Wirings = Mapping[str, "Callable[[], Wiring]"]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -77,14 +76,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _add_build_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--top", metavar="TOP", help="a shipped design; a wrong name lists them")
-    parser.add_argument(
-        "--gateware", metavar="FILE", help="your own design (docs/how-to/own-gateware.md)"
-    )
     names = [device.name for device in devices() if device.has_fpga]
-    parser.add_argument("--device", choices=names, help="the device whose pins it has")
+    parser.add_argument("--device", choices=names, help="the device with these options' design")
     add_value(parser, "baud", whole(BAUD, "rate of the serial port", 1))
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="where to write")
     add_flag(parser, "--json", "print JSON")
+    add_board_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -129,21 +126,16 @@ def _simulate(args: argparse.Namespace) -> int:
 
 def _design(args: argparse.Namespace) -> "tuple[str, Wiring]":
     """The design's name, and its wiring."""
-    if args.gateware and not args.device:
-        raise ValueError("--gateware needs --device, the device whose pins the design has")
+    if args.device and args.top:
+        raise ValueError("give --top, a shipped design, or --device, one with its options")
     if args.device:
-        wirings: _Wirings = registered(args.device).wirings()
-    else:
-        wirings = merged_tables(lambda device: device.wirings())
-    if not args.device and not args.top:
-        raise ValueError(f"say which design: --top, one of {', '.join(wirings)}, or --gateware")
-    name, make = one(wirings, args.top or next(iter(wirings)), "top with cameras and memories")
-    wiring = make()
-    if not args.gateware:
-        return name, wiring
-    from cubestack.hdl.user import load_gateware
-
-    gateware = load_gateware(args.gateware, wiring.component.pins)
-    for notice in gateware.notices:
-        say(notice)
-    return gateware.title, replace(wiring, component=gateware, burst_levels=())
+        device = registered(args.device)
+        wiring = fpga_wiring(device, chosen_options(args, device))
+        return getattr(wiring.component, "title", device.name), wiring
+    for name in given_options(args):
+        raise ValueError(f"{option_string(name)} needs --device, the device that has it")
+    wirings = merged_tables(lambda device: device.wirings())
+    if not args.top:
+        raise ValueError(f"say which design: --device, or --top, one of {', '.join(wirings)}")
+    name, make = one(wirings, args.top, "top with cameras and memories")
+    return name, make()

@@ -11,9 +11,10 @@ from ....conftest import Run
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ([], "say which design: --top, one of cubestar, "),
+        ([], "say which design: --device, or --top, one of cubestar, "),
         (["--top", "cubesense-sun"], "no top with cameras and memories; there are cubestar,"),
         (["--gateware", "x.v"], "--gateware needs --device"),
+        (["--top", "cubestar", "--device", "cubestar"], "give --top, a shipped design, or"),
         (["--top", "cubestar", "--baud", "5000000"], "the nearest rate is 6000000"),
     ],
 )
