@@ -47,6 +47,11 @@ class Pins:
         pin_number(pin)
         return self._outputs.get(pin)
 
+    def millivolts(self, pin: str) -> float | None:
+        """The voltage that the DAC drives at a pin; None for none."""
+        self._processor.catch_up()
+        return self._processor.machine.pin_millivolts(*divmod(pin_number(pin), 16))
+
     def driven(self, pin: str) -> int | str:
         """The level that the firmware or the outside drives, or `FLOATS`."""
         return self._outputs.get(pin, self._inputs.get(pin, FLOATS))

@@ -5,22 +5,19 @@ pins of all its signals at once.
 """
 
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass
 
-from cubestack.firmware_model.interface.efm32gg.pins import PINS, ROUTES, pin_number
+from cubestack.firmware_model.interface.efm32gg.pins import (
+    PINS,
+    SERIAL_UNITS,
+    pin_number,
+    serial_locations,
+)
 
 FORM = "BLOCK@TX,RX[:PATH|PORT]"
 
 _NEXT = re.compile(r",(?=\s*[A-Za-z]+[0-9]@)")
 _ROUTE = re.compile(r"\s*([A-Za-z]+[0-9])@(\w+),(\w+)(?::(.+))?")
-
-BLOCKS = tuple(
-    signal.removesuffix("_TX")
-    for signal in ROUTES
-    if signal.endswith("_TX") and f"{signal.removesuffix('TX')}RX" in ROUTES
-)
-"""Blocks that send and receive characters."""
 
 
 @dataclass(frozen=True)
@@ -53,16 +50,12 @@ def _parse(text: str) -> SerialRoute:
     if found is None:
         raise ValueError(f"serial {text!r} must be {FORM}, such as uart0@PE0,PE1:./tty")
     block, *pins, place = found.groups(default="")
-    if block.upper() not in BLOCKS:
-        known = ", ".join(BLOCKS).lower()
+    if block.upper() not in SERIAL_UNITS:
+        known = ", ".join(SERIAL_UNITS).lower()
         raise ValueError(f"serial {text!r}: the part has no {block!r}; it has {known}")
     tx, rx = (pin_number(pin.upper()) for pin in pins)
-    locations = list(_locations(block.upper()))
+    locations = serial_locations(block.upper())
     if (tx, rx) not in locations:
         known = " or ".join(f"{PINS[tx]},{PINS[rx]}" for tx, rx in locations)
         raise ValueError(f"serial {text!r}: TX,RX of {block} are {known}")
     return SerialRoute(block.lower(), tx, rx, place)
-
-
-def _locations(block: str) -> Iterator[tuple[int, int]]:
-    return zip(ROUTES[f"{block}_TX"], ROUTES[f"{block}_RX"], strict=True)

@@ -8,6 +8,7 @@ from cubestack.emulator.boards.efm32gg.board import Efm32ggBoard
 from cubestack.emulator.iss.image import Image
 from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S
 from tests.emulator.boards.efm32gg.programs import needs_both_compilers
+from tests.emulator.iss.efm32gg.bench import address_of, mask_of
 
 pytestmark = needs_both_compilers
 
@@ -56,6 +57,17 @@ def test_firmware_drives_harder_than_the_outside(board: Efm32ggBoard) -> None:
     assert (board.pins["PA3"], board.pins.driven("PA3"), board.pins.output("PA3")) == (1, 1, None)
     del board.pins["PA3"]
     assert (board.pins["PA3"], board.pins.driven("PA3")) == (0, "z")
+
+
+def test_dac_voltage_is_readable_at_its_pin(board: Efm32ggBoard) -> None:
+    wait_ms(board, 5)
+    write, enables = board.machine.write, address_of("CMU.HFPERCLKEN0")
+    write(enables, (board.machine.read(enables) or 0) | mask_of("CMU.HFPERCLKEN0.DAC0"))
+    for name, value in (("CTRL", 1 << 4 | 2 << 8), ("CH0CTRL", 1), ("CH0DATA", 2048)):
+        write(address_of(f"DAC0.{name}"), value)
+    wait_ms(board, 1)
+    assert board.pins.millivolts("PB11") == pytest.approx(3300 * 2048 / 4095)
+    assert board.pins.millivolts("PB12") is None
 
 
 def test_rejects_unknown_pins_and_levels(board: Efm32ggBoard) -> None:

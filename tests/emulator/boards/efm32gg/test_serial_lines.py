@@ -6,23 +6,21 @@ from contextlib import contextmanager
 import pytest
 
 from cubestack.emulator.boards.efm32gg.board import Efm32ggBoard
-from cubestack.emulator.boards.serial_routes import BLOCKS, SerialRoute, parse_routes
+from cubestack.emulator.boards.serial_routes import SerialRoute, parse_routes
 from cubestack.emulator.bus.line_format import LineFormat
 from cubestack.emulator.iss.image import Image
 from cubestack.emulator.ports.line import HostLine
 from cubestack.emulator.sim.virtual_time import PS_PER_MS
 from cubestack.firmware_model.interface.efm32gg import LAYOUTS
-from cubestack.firmware_model.interface.efm32gg.pins import PINS, ROUTES
+from cubestack.firmware_model.interface.efm32gg.pins import PINS, SERIAL_UNITS, serial_locations
 from tests.emulator.boards.efm32gg.programs import needs_both_compilers
 
 pytestmark = needs_both_compilers
 
 PLACES = [
     (block, location, f"{block.lower()}@{PINS[tx]},{PINS[rx]}")
-    for block in BLOCKS
-    for location, (tx, rx) in enumerate(
-        zip(ROUTES[f"{block}_TX"], ROUTES[f"{block}_RX"], strict=True)
-    )
+    for block in SERIAL_UNITS
+    for location, (tx, rx) in enumerate(serial_locations(block))
 ]
 
 
