@@ -111,6 +111,21 @@ def test_tasks_are_switched_by_systick_and_pendsv(start: Start) -> None:
     assert bench.text == f"sum {total:08x}\n"
 
 
+@pytest.mark.parametrize(("name", "word"), [("tickless", "rtc"), ("tickless_burtc", "burtc")])
+def test_tickless_kernel_sleeps_until_each_task_is_due(start: Start, name: str, word: str) -> None:
+    bench = start(name)
+    deepest = 0
+    while bench.machine.now_ps < 2600 * MS:
+        bench.run_for(13 * MS)
+        deepest = max(deepest, bench.machine.energy_mode)
+    assert deepest == 2
+    counter, delay, slept = bench.text.split()
+    assert (counter, slept) == (word, "slept")
+    assert int(delay, 16) <= 20  # ticks of 30.5 us: the wake-up, and the other task
+    # The crystal takes 1.4 s to start; the slow task ends after 8 times 2531 ticks.
+    assert bench.sent[0].time_ps / MS == pytest.approx(1400 + 8 * 2531 / 32.768, abs=60)
+
+
 def test_watchdog_resets_repeatedly(start: Start) -> None:
     bench = start("watchdog")
     bench.run_until(450 * MS)

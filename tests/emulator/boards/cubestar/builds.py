@@ -22,10 +22,10 @@ needs_both_compilers = [
 ]
 
 
-def build(name: str, folder: Path) -> Path:
+def build(name: str, folder: Path, *options: str) -> Path:
     (folder / "processor.h").write_text(processor_header(device("cubestar").processor()))
     target = folder / f"{name}.elf"
     inputs = [PROGRAMS / "start.c", PROGRAMS / f"{name}.c", "-T", PROGRAMS / "board.ld", "-lgcc"]
-    command = [COMPILER or "", *FLAGS, f"-I{folder}", *inputs, "-o", target]
+    command = [COMPILER or "", *FLAGS, *options, f"-I{folder}", *inputs, "-o", target]
     subprocess.run(command, check=True)
     return target

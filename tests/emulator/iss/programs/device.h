@@ -55,6 +55,11 @@ typedef struct {
 } RTC_TypeDef;
 
 typedef struct {
+    __IO uint32_t CTRL, LPMODE, CNT, COMP0, TIMESTAMP, LFXOFDET, STATUS, CMD, POWERDOWN, LOCK, IF,
+        IFS, IFC, IEN, FREEZE, SYNCBUSY;
+} BURTC_TypeDef;
+
+typedef struct {
     __IO uint32_t CTRL, CMD, STATUS, CNT, COMP0, COMP1, REP0, REP1, IF, IFS, IFC, IEN, FREEZE,
         SYNCBUSY, RESERVED0[2], ROUTE;
 } LETIMER_TypeDef;
@@ -89,6 +94,7 @@ typedef struct {
 #define I2C0 ((I2C_TypeDef *)0x4000A000UL)
 #define DMA ((DMA_TypeDef *)0x400C2000UL)
 #define RTC ((RTC_TypeDef *)0x40080000UL)
+#define BURTC ((BURTC_TypeDef *)0x40081000UL)
 #define LETIMER0 ((LETIMER_TypeDef *)0x40082000UL)
 #define MSC ((MSC_TypeDef *)0x400C0000UL)
 #define WDOG ((WDOG_TypeDef *)0x40088000UL)
@@ -96,7 +102,9 @@ typedef struct {
 #define SysTick ((SysTick_Type *)0xE000E010UL)
 #define SCB ((SCB_Type *)0xE000ED00UL)
 #define NVIC_ISER ((__IO uint32_t *)0xE000E100UL)
-enum { DMA_IRQn = 0, I2C0_IRQn = 9, UART0_RX_IRQn = 20, LETIMER0_IRQn = 26, RTC_IRQn = 30 };
+enum {
+    DMA_IRQn = 0, I2C0_IRQn = 9, UART0_RX_IRQn = 20, LETIMER0_IRQn = 26, RTC_IRQn = 30, BURTC_IRQn = 31
+};
 
 static inline void NVIC_EnableIRQ(int irq) { NVIC_ISER[irq >> 5] = 1UL << (irq & 31); }
 static inline void __WFI(void) { __asm volatile("wfi" ::: "memory"); }
