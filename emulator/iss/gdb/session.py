@@ -40,6 +40,7 @@ class Session:
         self._target = target
         self._packets = packets.Deframer()
         self._awaiting = False  # the client waits for the target to stop
+        self._extended = False  # it can run the target again: "target extended-remote"
         self._last = b""
         self._flashed: dict[int, bytes] = {}
         self._breakpoints: set[tuple[int, int]] = set()  # (kind of packet, address)
@@ -104,6 +105,10 @@ class Session:
         for name in ("sp", "lr", "pc"):
             text += f"{number[name]:02x}:{self._register(name)};"
         return text.encode()
+
+    def _extend(self, _text: str) -> bytes:
+        self._extended = True
+        return OK
 
     def _ask(self, _text: str) -> bytes | None:
         stop = self._target.halted
@@ -205,8 +210,8 @@ class Session:
                 self._target.restart()
             return self._ask("")
         if text.startswith("Kill"):
-            self._detach("")
-            return OK
+            # An extended client that wants to run again kills first, and stays.
+            return OK if self._extended else self._detach("")
         return UNKNOWN
 
     def _resume(self, action: str) -> bytes | None:
@@ -311,7 +316,7 @@ def _pair(text: str) -> tuple[int, int]:
 
 _COMMANDS: dict[str, Callable[[Session, str], bytes | None]] = {
     "?": Session._ask,
-    "!": lambda _session, _text: OK,
+    "!": Session._extend,
     "g": Session._read_all,
     "G": Session._write_all,
     "p": Session._read_one,

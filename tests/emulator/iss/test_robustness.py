@@ -173,3 +173,11 @@ def test_machine_runs_on_after_random_interface_writes_and_inputs(seed: int) -> 
             machine.read(rng.choice(INTERFACES)[0])
         assert time.monotonic() - wall < PATIENCE_S
     assert bench.now > began
+
+
+def test_run_ends_soon_while_the_memory_protection_changes_all_the_time(fuzz: Fuzz) -> None:
+    loop = "again: str r1, [r0]; str r2, [r0]; b again"
+    begin = fuzz.start(program(f"ldr r0, =0xE000ED94; movs r1, #5; movs r2, #4; {loop}"))
+    before = fuzz.machine.instructions
+    fuzz.run(begin + 1000 * MS)
+    assert 100 < fuzz.machine.instructions - before < 10_000

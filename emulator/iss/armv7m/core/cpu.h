@@ -142,6 +142,9 @@ public:
     std::vector<Region> regions;
     void add_region(const Region &region) { regions.push_back(region), regions_changed(); }
     void regions_changed();
+    // The number of those calls, which take microseconds. At the second number run() ends, with
+    // ExitDeadline.
+    uint64_t changes = 0, most_changes = UINT64_MAX;
     // Call it after lines lost words other than by a fetch.
     void lines_changed();
     // Call it after code in a region was changed other than by the core's stores.

@@ -62,6 +62,7 @@ void Cpu::regions_changed() {
         }
     }
     lines_changed();
+    if (++changes == most_changes) lower_deadline(cycles);
     limit = INT64_MIN;
 }
 

@@ -109,6 +109,14 @@ bool Cpu::may_fetch(uint32_t pc, uint32_t halves) {
 // The fetch of all that is decoded there may cost something.
 void Cpu::fetch_again(Code &code) {
     for (uint32_t offset = 0; offset < code.size; offset += 64) {
+        uint64_t eight;    // marks; most are 0
+        if (offset % 512 == 0 && code.size - offset >= 512) {
+            std::memcpy(&eight, &code.marks[offset >> 6], 8);
+            if (eight == 0) {
+                offset += 448;
+                continue;
+            }
+        }
         if (!code.marks[offset >> 6]) continue;
         Operation *op = code.operations.get() + offset / 2;
         for (uint32_t left = std::min(code.size - offset, 64u) / 2; left != 0; left--, op++)

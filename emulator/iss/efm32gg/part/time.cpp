@@ -77,17 +77,19 @@ void Part::perform_due(int64_t &steps) {
 
 // Bounds of the work of one run, about a hundredth of a second of wall time: the caller may then
 // handle an interrupt, and continues.
-static constexpr int64_t MOST_INSTRUCTIONS = 1 << 19, MOST_STEPS = 1 << 14;
+static constexpr int64_t MOST_INSTRUCTIONS = 1 << 19, MOST_STEPS = 1 << 14, MOST_CHANGES = 1 << 10;
 
 int64_t Part::run(int64_t until) {
     exits = 0;
     stop_wanted = false;
     const uint64_t last_instruction = cpu.instructions + MOST_INSTRUCTIONS;
+    cpu.most_changes = cpu.changes + MOST_CHANGES;
     const int64_t began = now();
     int64_t steps = MOST_STEPS;
     for (;;) {
         perform_due(steps);
-        if (steps-- <= 0 || cpu.instructions >= last_instruction) {
+        if (steps-- <= 0 || cpu.instructions >= last_instruction ||
+            cpu.changes >= cpu.most_changes) {
             if (now() == began)
                 log_once("events of the peripherals follow each other without time passing");
             exits |= armv7m::ExitDeadline;

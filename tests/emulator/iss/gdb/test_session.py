@@ -245,3 +245,10 @@ def test_session_survives_random_bytes(data: bytes) -> None:
     talk.send(data)
     talk.session.close()
     assert talk.target.halted is None
+
+
+def test_extended_client_kills_and_runs_again_on_the_same_connection(talk: Talk) -> None:
+    assert talk.ask("!") == b"OK"
+    assert talk.ask("vKill;1") == b"OK"
+    assert not talk.session.ended
+    assert (talk.ask("vRun;") or b"").startswith(b"T")
