@@ -8,6 +8,7 @@
 #include "armv7m/core/cpu.h"
 #include "armv7m/system/system.h"
 #include "efm32gg/analog/dac.h"
+#include "efm32gg/memory/msc.h"
 #include "efm32gg/part/part.h"
 #include "efm32gg/pins/gpio.h"
 #include "efm32gg/serial/i2c.h"
@@ -232,6 +233,28 @@ int32_t iss_load(IssMachine *machine, uint32_t address, int32_t bytes, uint32_t 
 
 int32_t iss_store(IssMachine *machine, uint32_t address, int32_t bytes, uint32_t value) {
     return machine->cpu.store(address, (uint32_t)bytes, value) == armv7m::Result::Done;
+}
+
+// Whether changes of the flash are logged from now on.
+void iss_flash_log(IssMachine *machine, int32_t on) {
+    if (machine->part)
+        machine->part->msc->cells.logging = on != 0;
+}
+
+// Moves the oldest changes, up to `count`, to `out`; returns their number.
+int64_t iss_flash_changes(IssMachine *machine, efm32gg::FlashChange *out, int64_t count) {
+    if (!machine->part) return 0;
+    auto &log = machine->part->msc->cells.log;
+    const auto end = log.begin() + std::min<int64_t>(count, (int64_t)log.size());
+    const int64_t taken = std::copy(log.begin(), end, out) - out;
+    log.erase(log.begin(), end);
+    return taken;
+}
+
+// The bits in `mask` of a word in flash keep their value for good.
+void iss_flash_wear(IssMachine *machine, uint32_t address, uint32_t mask) {
+    if (machine->part)
+        machine->part->msc->cells.wear_out(address, mask);
 }
 
 void iss_invalidate(IssMachine *machine, uint32_t address, int64_t count) {

@@ -61,6 +61,21 @@ class FpgaWireRecord(ctypes.Structure):
     )
 
 
+class FlashChangeRecord(ctypes.Structure):
+    """``FlashChange`` of efm32gg/memory/flash_cells.h."""
+
+    _fields_ = (
+        ("time", ctypes.c_int64),
+        ("duration", ctypes.c_int64),
+        ("address", ctypes.c_uint32),
+        ("size", ctypes.c_uint32),
+        ("before", ctypes.c_uint32),
+        ("after", ctypes.c_uint32),
+        ("pc", ctypes.c_uint32),
+        ("erased", ctypes.c_int32),
+    )
+
+
 class RangeRecord(ctypes.Structure):
     """``CodeRange`` of insight.cpp."""
 
@@ -116,6 +131,9 @@ _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "iss_poke": (_L, (_P, _U, ctypes.POINTER(ctypes.c_uint8), _L)),
     "iss_load": (_I, (_P, _U, _I, ctypes.POINTER(_U))),
     "iss_store": (_I, (_P, _U, _I, _U)),
+    "iss_flash_log": (None, (_P, _I)),
+    "iss_flash_changes": (_L, (_P, ctypes.POINTER(FlashChangeRecord), _L)),
+    "iss_flash_wear": (None, (_P, _U, _U)),
     "iss_invalidate": (None, (_P, _U, _L)),
     "iss_pin": (None, (_P, _I, _I, _I)),
     "iss_pin_level": (_I, (_P, _I, _I)),

@@ -11,11 +11,18 @@ from collections.abc import Iterator, MutableSet
 import numpy as np
 
 from cubestack.emulator.iss.binding import (
+    FlashChangeRecord,
     FpgaDriverRecord,
     FpgaWireRecord,
     Library,
     OutgoingRecord,
     simulator,
+)
+from cubestack.emulator.iss.flash_changes import (
+    INFORMATION_BASE,
+    PAGE_BYTES,
+    PAGE_STEP,
+    FlashChange,
 )
 from cubestack.emulator.iss.image import Image
 from cubestack.emulator.iss.outcome import Outgoing, OutgoingKind, Stop, StopReason, Watch, WatchHit
@@ -27,12 +34,8 @@ EXTERNAL_BASE = 0x8000_0000
 
 FLASH_BYTES = 1 << 20
 RAM_BYTES = 128 << 10
-PAGE_BYTES = 4096
 INFORMATION_BYTES = 3 * PAGE_BYTES
 """User page, lock bits, device information."""
-
-INFORMATION_BASE, PAGE_STEP = 0x0FE0_0000, 0x4000
-"""Address of the first of these pages, and the distance between them."""
 
 LOADED_PAGES = 2
 """Of them, those that a program's file may fill."""
@@ -239,6 +242,23 @@ class Machine:
     def invalidate(self, address: int, count: int) -> None:
         """Discard decoded instructions of memory that was changed from outside."""
         self._library.iss_invalidate(self.handle, address, count)
+
+    # Flash
+
+    def log_flash(self, on: bool = True) -> None:
+        """Log the changes of flash, user page and lock bits that the program makes."""
+        self._library.iss_flash_log(self.handle, on)
+
+    def flash_changes(self) -> list[FlashChange]:
+        """Remove and return the logged changes, in the order of time."""
+        found, records = list[FlashChange](), (FlashChangeRecord * 256)()
+        while count := self._library.iss_flash_changes(self.handle, records, len(records)):
+            found += [FlashChange.of(one) for one in records[:count]]
+        return found
+
+    def wear_out(self, address: int, mask: int) -> None:
+        """Let the bits in ``mask`` of a word in flash keep their value for good."""
+        self._library.iss_flash_wear(self.handle, address, mask)
 
     # Inputs
 

@@ -238,11 +238,12 @@ void Msc::program() {
         uint8_t *cell = page(at);
         uint32_t old;
         std::memcpy(&old, cell, 4);
-        const uint32_t now = old & data[n];
+        const uint32_t now = cells.changed(at, old, old & data[n]);
         if (data[n] & ~old)
             part.log_once("flash at 0x%X is written without erasure: bits stay 0", (unsigned)at);
         std::memcpy(cell, &now, 4);
         part.cpu.invalidate(at, 4);
+        note(at, 4, old, now, false, PROGRAM_TIME);
         part.send(Kind::FLASH, 0, at, 4, false);
     }
     erasing = false;
@@ -250,8 +251,15 @@ void Msc::program() {
 }
 
 void Msc::erase(uint32_t at, uint32_t size, int64_t time) {
-    std::memset(page(at), 0xFF, size);
+    uint8_t *start = page(at);
+    for (uint32_t n = 0; n < size; n += 4) {
+        uint32_t old;
+        std::memcpy(&old, start + n, 4);
+        const uint32_t now = cells.changed(at + n, old, 0xFFFFFFFF);
+        std::memcpy(start + n, &now, 4);
+    }
     part.cpu.invalidate(at, size);
+    note(at, size, 0, 0xFFFFFFFF, true, time);
     for (uint32_t one = at; one < at + size && one < part.memories.flash_size;
          one += Part::PAGE_BYTES)
         wear[one / Part::PAGE_BYTES]++;
@@ -259,6 +267,11 @@ void Msc::erase(uint32_t at, uint32_t size, int64_t time) {
                                       ? wear[at / Part::PAGE_BYTES] : size, false);
     erasing = true;
     occupy(time);
+}
+
+void Msc::note(uint32_t at, uint32_t size, uint32_t before, uint32_t after, bool erased,
+               int64_t duration) {
+    cells.note({part.now(), duration, at, size, before, after, part.cpu.r[15], erased});
 }
 
 void Msc::occupy(int64_t time) {

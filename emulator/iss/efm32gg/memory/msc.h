@@ -3,6 +3,7 @@
 #pragma once
 
 #include "armv7m/memory/bus.h"
+#include "efm32gg/memory/flash_cells.h"
 #include "efm32gg/part/part.h"
 
 namespace efm32gg {
@@ -25,6 +26,8 @@ public:
     // Wait states of a data access to flash or information; stalls the core while flash is busy.
     int64_t read_wait(uint32_t address);
     bool ignores_bus_writes() const { return reg(msc::CTRL) & msc::CTRL_BUSFAULT; }
+
+    FlashCells cells;
 
 private:
     armv7m::FetchLines lines{};
@@ -54,6 +57,8 @@ private:
     bool page_locked(uint32_t at) const;
     uint8_t *page(uint32_t at);
     void program();
+    void note(uint32_t at, uint32_t size, uint32_t before, uint32_t after, bool erased,
+              int64_t duration);
     void erase(uint32_t at, uint32_t size, int64_t time);
     void occupy(int64_t time);
     void release();
