@@ -1,0 +1,355 @@
+"""Tries cases: cuts the supply of a copy of a device, powers it up, and asks it."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+
+import numpy as np
+
+from cubestack.emulator.iss.brown_out import Dip, dip_of, volts_at
+from cubestack.emulator.iss.flash_changes import PAGE_BYTES, FlashContents, FlashOperation
+from cubestack.host.studies.copies import in_copy
+from cubestack.host.studies.powerfail.cases import (
+    BROWN_OUT,
+    WORN,
+    Case,
+    Cut,
+    SecondCut,
+    second_cuts,
+)
+from cubestack.host.studies.powerfail.course import Course
+from cubestack.host.studies.powerfail.rig import OBEYED, SILENT, Rig, Setup, seeded
+from cubestack.host.studies.powerfail.scenario import Answers
+
+RIGHT = "right"
+MIXED, FORGOTTEN, WRONG, UNSTABLE, STUCK = "mixed", "forgotten", "wrong", "unstable", "stuck"
+
+MEANINGS = {
+    RIGHT: "the device remembers what it must, and goes on",
+    SILENT: "the device does not answer a question",
+    FORGOTTEN: "it remembers an earlier state, although it had acknowledged a later one",
+    MIXED: "it remembers parts of two states",
+    WRONG: "it remembers what never was",
+    UNSTABLE: "it remembers something else after another power-up",
+    STUCK: "it does not obey the next command, or forgets its effect",
+}
+
+TRIAL = 4
+"""Marks random numbers of a case."""
+
+VDD = 9
+"""Analog input of the part: its supply."""
+
+SUPPLY_STEPS = 40
+"""Steps in which a changing supply is shown to the part."""
+
+WORN_WORDS = 4
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a case."""
+
+    verdict: str  #: a key of ``MEANINGS``
+    answers: Answers  #: after the power-up
+    detail: str = ""  #: what is wrong
+    recovery: list[FlashOperation] = field(default_factory=list)  #: until it had answered
+
+
+@dataclass(frozen=True)
+class Row:
+    """A case that was tried, for reports."""
+
+    case: str  #: number, behind a dot that of a second cut
+    kind: str
+    operation: int  #: of the course
+    address: int  #: of the flash that it changes; -1 for none
+    erases: bool
+    pc: int  #: of the instruction that began the operation
+    time_s: float  #: of the cut, since power-up
+    share: float | None  #: of the operation that was done
+    verdict: str
+    answers: Answers
+    allowed: tuple[Answers, ...]
+    detail: str
+    second: bool = False
+
+    @property
+    def right(self) -> bool:
+        return self.verdict == RIGHT
+
+
+class Cursor:
+    """Contents of the flash in the course of its operations; cheap from one to the next."""
+
+    def __init__(self, start: FlashContents, operations: Sequence[FlashOperation]) -> None:
+        self._start, self._operations = start, operations
+        self._now, self._done = start.copy(), 0
+
+    def at(self, cut: Cut, rng: np.random.Generator) -> FlashContents:
+        """A copy of the contents after a cut."""
+        if cut.operation < self._done:
+            self._now, self._done = self._start.copy(), 0
+        for one in self._operations[self._done : cut.operation]:
+            self._now.apply(one)
+        self._done = cut.operation
+        contents = self._now.copy()
+        if cut.share is not None:
+            contents.tear(self._operations[cut.operation], cut.share, rng)
+        return contents
+
+
+class Tester:
+    """Tries the cases of one set-up.
+
+    ``fresh`` is a device that was just powered up; each case runs in a copy of it.
+    """
+
+    def __init__(self, setup: Setup, course: Course, fresh: Rig) -> None:
+        self._setup, self._scenario, self._course, self._fresh = (
+            setup, setup.scenario, course, fresh,
+        )  # fmt: skip
+        self._start = FlashContents.of(fresh.machine)
+        self._cursor = Cursor(self._start, course.operations)
+
+    def perform(self, cases: Iterable[Case]) -> Iterator[Row]:
+        """Try them in their order, each with its second cuts."""
+        dips = list[Case]()
+        for case in cases:
+            if case.kind == BROWN_OUT:
+                dips.append(case)
+            elif case.kind == WORN:
+                yield self._row(case, in_copy(partial(self._wear, self._fresh, case)))
+            else:
+                yield from self._cut(case)
+        yield from self._brown_outs(dips)
+
+    def contents(self, case: Case) -> FlashContents:
+        """Of the flash after its cut."""
+        return self._cursor.at(case.cut, self.random(case, 0))
+
+    def second_contents(
+        self, case: Case, recovery: Sequence[FlashOperation], second: SecondCut
+    ) -> FlashContents:
+        rng = self.random(case, 2 + 2 * second.number)
+        return Cursor(self.contents(case), recovery).at(second.cut, rng)
+
+    def random(self, case: Case, purpose: int) -> np.random.Generator:
+        return seeded(self._scenario.seed, TRIAL, case.number, purpose)
+
+    def _cut(self, case: Case) -> Iterator[Row]:
+        contents = self.contents(case)
+        outcome = in_copy(partial(self.recover, self._fresh, contents, case, 1))
+        yield self._row(case, outcome)
+        for second in second_cuts(self._scenario, case, outcome.recovery):
+            again = self.second_contents(case, outcome.recovery, second)
+            purpose = 3 + 2 * second.number
+            found = in_copy(partial(self.recover, self._fresh, again, case, purpose))
+            yield self._row(case, found, second)
+
+    def recover(self, rig: Rig, contents: FlashContents, case: Case, purpose: int) -> Outcome:
+        """Power a device up with this flash, and examine it."""
+        rng = self.random(case, purpose)
+        rig.flash_operations()
+        rig.power_up(contents, rng)
+        return self.examine(rig, case, rng)
+
+    def examine(self, rig: Rig, case: Case, rng: np.random.Generator) -> Outcome:
+        """Ask a device that starts, ask it again after a power-up, and let it go on."""
+        rig.await_start()
+        answers = rig.ask()
+        recovery = rig.flash_operations()
+        verdict, detail, state = self._judge(answers, case.time_ps)
+        if verdict == RIGHT:
+            verdict, detail = self._follow(rig, answers, state, rng)
+        return Outcome(verdict, answers, detail, recovery)
+
+    def _judge(self, answers: Answers, time_ps: int) -> tuple[str, str, int]:
+        """Verdict, what is wrong, and the index of the state."""
+        states, allowed = self._course.states, self._course.allowed(time_ps)
+        silent = [
+            one.name
+            for one, answer in zip(self._scenario.question, answers, strict=True)
+            if answer is None
+        ]
+        if silent:
+            return SILENT, f"no answer to {', '.join(silent)}", 0
+        for state in allowed:
+            if answers == states[state]:
+                return RIGHT, "", state
+        if answers in states[: allowed.start]:
+            return FORGOTTEN, f"as after step {states.index(answers)} of {allowed.start}", 0
+        parts = zip(answers, *(states[state] for state in allowed), strict=True)
+        if all(answer in known for answer, *known in parts):
+            return MIXED, f"parts of {len(allowed)} states", 0
+        return WRONG, "a state that never was", 0
+
+    def _follow(
+        self, rig: Rig, answers: Answers, state: int, rng: np.random.Generator
+    ) -> tuple[str, str]:
+        again = _cycle(rig, rng)
+        if again != answers:
+            return UNSTABLE, f"after another power-up {_told(again)}"
+        if state == len(self._scenario.step):
+            return RIGHT, ""
+        step = self._scenario.step[state]
+        answer = rig.perform(step)
+        if answer != OBEYED:
+            return STUCK, f"step {state + 1}, repeated, is {answer}"
+        rig.emulated.wait(step.settle_s)
+        after = _cycle(rig, rng)
+        if after != self._course.states[state + 1]:
+            return STUCK, f"after step {state + 1}, repeated, {_told(after)}"
+        return RIGHT, ""
+
+    # Brown-outs
+
+    def _brown_outs(self, cases: Sequence[Case]) -> Iterator[Row]:
+        """Cases in the order of their time: copies of a device that runs the scenario."""
+        if not cases:
+            return
+        rig = Rig(self._setup)
+        try:
+            player = Player(rig, self._course)
+            starts = [(max(0, case.time_ps - self._dip(case).reset_ps), case) for case in cases]
+            for start, case in sorted(starts, key=lambda one: (one[0], one[1].number)):
+                player.play(start)
+                yield self._row(case, in_copy(partial(self._dip_at, player, case)))
+        finally:
+            rig.close()
+
+    def _dip(self, case: Case) -> Dip:
+        found = dip_of(self._scenario.brown_out[case.curve].curve)
+        assert found is not None
+        return found
+
+    def _dip_at(self, player: "Player", case: Case) -> Outcome:
+        rng, curve = self.random(case, 1), self._scenario.brown_out[case.curve].curve
+        dip, rig = self._dip(case), player.rig
+        start = case.time_ps - dip.reset_ps
+        supply = [
+            (start + round(ms * 1e9), volts_at(curve, ms))
+            for ms in np.linspace(curve[0][0], curve[-1][0], SUPPLY_STEPS).tolist()
+        ]
+        for at, volts in supply:
+            if at < case.time_ps:
+                player.play(at)
+                _set_supply(rig, volts)
+        player.play(case.time_ps)
+        contents = self._torn(rig, case)
+        contents.load(rig.machine)
+        rig.restart(dip.cause)
+        rig.machine.hang()  # the reset lasts
+        release = start + dip.release_ps
+        for at, volts in supply:
+            if case.time_ps <= at < release:
+                rig.kernel.advance_to(at)
+                _set_supply(rig, volts)
+        rig.kernel.advance_to(release)
+        if dip.forgets:
+            rig.power_up(contents, rng)
+        else:
+            rig.restart(dip.cause)
+        _set_supply(rig, supply[-1][1])
+        return self.examine(rig, case, rng)
+
+    def _torn(self, rig: Rig, case: Case) -> FlashContents:
+        """The flash now, with the operation that is under way torn."""
+        done = rig.flash_operations()
+        now = case.time_ps
+        if not done or not done[-1].time_ps <= now < done[-1].end_ps:
+            return FlashContents.of(rig.machine)
+        share = (now - done[-1].time_ps) / (done[-1].end_ps - done[-1].time_ps)
+        return Cursor(self._start, done).at(Cut(len(done) - 1, share), self.random(case, 0))
+
+    # Worn pages
+
+    def _wear(self, rig: Rig, case: Case) -> Outcome:
+        """Run the scenario with cells that keep their value from one step on."""
+        rng, step_at = self.random(case, 1), self._course.step_at(case.time_ps)
+        states, may = self._course.states, [{one} for one in self._course.states[0]]
+        rig.await_start()
+        for place, step in enumerate(self._scenario.step):
+            if place == step_at:
+                self._wear_out(rig, case, rng)
+            answer = rig.perform(step)
+            if answer == SILENT:
+                return Outcome(SILENT, (), f"step {place + 1} has no answer")
+            rig.emulated.wait(step.settle_s)
+            for known, before, after in zip(may, states[place], states[place + 1], strict=True):
+                if before != after and answer == OBEYED:
+                    known.clear()
+                if before != after:
+                    known.add(after)
+        answers = _cycle(rig, rng)
+        if None in answers:
+            return Outcome(SILENT, answers, "no answer after a power-up")
+        if all(answer in known for answer, known in zip(answers, may, strict=True)):
+            return Outcome(RIGHT, answers)
+        return Outcome(FORGOTTEN, answers, "it acknowledged what it could not store")
+
+    def _wear_out(self, rig: Rig, case: Case, rng: np.random.Generator) -> None:
+        page = self._course.operations[case.cut.operation].first.address
+        used = {
+            change.address
+            for one in self._course.operations
+            for change in one.changes
+            if not change.erased and page <= change.address < page + PAGE_BYTES
+        }
+        words = sorted(used) or list(range(page, page + PAGE_BYTES, 4))
+        for address in rng.choice(words, min(WORN_WORDS, len(words)), replace=False):
+            rig.machine.wear_out(int(address), 1 << int(rng.integers(32)))
+
+    def _row(self, case: Case, outcome: Outcome, second: SecondCut | None = None) -> Row:
+        place = case.cut.operation
+        known = self._course.operations
+        first = known[place].first if place < len(known) else None
+        cut = case.cut if second is None else second.cut
+        return Row(
+            f"{case.number}" if second is None else f"{case.number}.{second.number}",
+            case.kind,
+            place,
+            -1 if first is None else first.address,
+            first is not None and first.erased,
+            -1 if first is None else first.pc,
+            case.time_ps / 1e12,
+            cut.share,
+            outcome.verdict,
+            outcome.answers,
+            tuple(self._course.states[one] for one in self._course.allowed(case.time_ps)),
+            outcome.detail,
+            second is not None,
+        )
+
+
+class Player:
+    """Runs a device with what the host sent in the course of a scenario."""
+
+    def __init__(self, rig: Rig, course: Course) -> None:
+        self.rig = rig
+        self._sent = list(course.sent)
+
+    def play(self, until_ps: int) -> None:
+        """Run up to a time."""
+        kernel = self.rig.kernel
+        while self._sent and self._sent[0][0] <= until_ps:
+            at, data = self._sent.pop(0)
+            kernel.advance_to(at)
+            self.rig.host.write(data)
+        kernel.advance_to(until_ps)
+
+
+def _cycle(rig: Rig, rng: np.random.Generator) -> Answers:
+    """Answers after a cut while nothing happens."""
+    rig.power_up(FlashContents.of(rig.machine), rng)
+    rig.await_start()
+    return rig.ask()
+
+
+def _set_supply(rig: Rig, volts: float) -> None:
+    rig.machine.analog[VDD] = volts
+    rig.processor.change_inputs(rig.machine.analog_changed)
+
+
+def _told(answers: Answers) -> str:
+    return ", ".join("no answer" if one is None else repr(one) for one in answers)
