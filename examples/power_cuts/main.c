@@ -50,7 +50,8 @@ static void start_uart(void) {
     CMU->HFPERCLKEN0 = CMU_HFPERCLKEN0_GPIO | SATELLITE_UART_CLOCK;
     make(SATELLITE_UART_TX_PIN, PUSH_PULL);
     make(SATELLITE_UART_RX_PIN, INPUT);
-    SATELLITE_UART->CLKDIV = (CLOCK_HZ * 16u / SATELLITE_BAUD - 256u) & USART_CLKDIV_DIV;
+    // The divider counts in 256ths, in steps of 64 of them.
+    SATELLITE_UART->CLKDIV = (CLOCK_HZ * 16u / SATELLITE_BAUD - 256u + 32u) & USART_CLKDIV_DIV;
     SATELLITE_UART->ROUTE = USART_ROUTE_TXPEN | USART_ROUTE_RXPEN |
                             SATELLITE_UART_LOCATION << USART_ROUTE_LOCATION_SHIFT;
     SATELLITE_UART->CMD = USART_CMD_TXEN | USART_CMD_RXEN;
@@ -114,6 +115,7 @@ static void list(void) {
 int main(void) {
     settings_load();
     start_uart();
+    put("ready\n");
     for (;;) {
         get_line();
         const char *rest = line + 1;

@@ -14,6 +14,7 @@ COMMANDS = {
         ("fidelity", "fidelity.command", "measure every published figure, in both profiles"),
         ("hazards", "hazards.command", "count right, refused and wrong results in hard skies"),
         ("campaign", "campaign.command", "measure thousands of skies, resumable, on all cores"),
+        ("powerfail", "powerfail.command", "cut the power at every flash write; check what boots"),
         ("calibrate", "calibrate", "fit a camera's lens to pictures of stars or lights"),
         ("costs", "costs", "count the cycles of a device's program as compiled code"),
         ("picture", "picture", "render what a star tracker sees at a known attitude"),

@@ -170,13 +170,15 @@ def _page(
         f"<code>{escape(str(dict(plan.options)))}</code>; drawn anew for each block "
         f"<code>{escape(str(dict(plan.random)))}</code>. 95 % limits are Wilson's.</p>",
         "<h2>How often</h2>",
-        _table(["", "results", *ENDINGS], [_rates(point, ended) for point, ended in found.items()]),
+        html_table(
+            ["", "results", *ENDINGS], [_rates(point, ended) for point, ended in found.items()]
+        ),
     ]
     if against is not None:
         parts += [f"<h2>Compared with {escape(str(against))}</h2>", _changes(changes)]
     for section in sections:
         if section.rows:
-            parts += [f"<h2>{escape(section.title)}</h2>", _table(section.head, section.rows)]
+            parts += [f"<h2>{escape(section.title)}</h2>", html_table(section.head, section.rows)]
     for name, png in pictures.items():
         parts.append(f"<h2>{escape(Path(name).stem.replace('_', ' ').replace('-', ' '))}</h2>")
         data = b64encode(png).decode("ascii")
@@ -190,7 +192,7 @@ def _page(
     failed = [(number, row) for number, row in enumerate(folder.rows()) if row.outcome == "failed"]
     if failed:
         lines = [[str(number), row.reason] for number, row in failed[:FAILURES]]
-        parts += [f"<h2>{len(failed)} failed</h2>", _table(["row, for replay", "error"], lines)]
+        parts += [f"<h2>{len(failed)} failed</h2>", html_table(["row, for replay", "error"], lines)]
     return "\n".join([*parts, "</html>"]) + "\n"
 
 
@@ -205,7 +207,7 @@ def _rates(point: Point, ended: Counter[str]) -> list[str]:
 
 def _changes(changes: Sequence[Change]) -> str:
     head = ["", "outcome", "before", "after", "only before", "only after", "by chance", ""]
-    return _table(
+    return html_table(
         head,
         [
             [
@@ -221,7 +223,8 @@ def verdict(change: Change) -> str:
     return "worse" if change.worse else "better" if change.significant else "no change"
 
 
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+def html_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A table of texts."""
     lines = ["<table>", "<tr>" + "".join(f"<th>{escape(cell)}</th>" for cell in head) + "</tr>"]
     lines += [
         "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows

@@ -1,6 +1,6 @@
 """The cases of a scenario: when the supply is cut, and in which way."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import count
 
@@ -106,13 +106,20 @@ def _worn(scenario: Scenario, course: Course) -> Iterator[tuple[str, Cut, int]]:
                 yield WORN, Cut(place), one.time_ps
 
 
-def second_cuts(scenario: Scenario, case: Case, recovery: list[FlashOperation]) -> list[SecondCut]:
-    """Cuts of the operations of a recovery; a random choice if there are more than wanted."""
+def every_second_cut(scenario: Scenario, recovery: Sequence[FlashOperation]) -> list[SecondCut]:
+    """Cuts in and after each operation of a recovery."""
     found = list[tuple[Cut, int]]()
     for place, one in enumerate(recovery):
         found += [(Cut(place, share), _moment(one, share)) for share in shares(scenario.torn)]
         found.append((Cut(place + 1), one.end_ps))
-    every = [SecondCut(number, *one) for number, one in enumerate(found)]
+    return [SecondCut(number, *one) for number, one in enumerate(found)]
+
+
+def second_cuts(
+    scenario: Scenario, case: Case, recovery: Sequence[FlashOperation]
+) -> list[SecondCut]:
+    """Second cuts of a case; a random choice if there are more than the scenario wants."""
+    every = every_second_cut(scenario, recovery)
     if len(every) <= scenario.second:
         return every
     rng = seeded(scenario.seed, SECONDS, case.number)

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from cubestack.emulator.iss.insight.symbols import Symbols
 from cubestack.emulator.ports.line import DirectSerial
 from cubestack.emulator.sim.firmware_processor import FirmwareProcessor
 from cubestack.emulator.sim.virtual_time import PS_PER_S
-from cubestack.firmware_model.interface.codec.message import InterfaceError
+from cubestack.firmware_model.interface.codec.field import InterfaceError
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.emulation.emulated import open_device
 from cubestack.host.errors import (
@@ -46,6 +47,16 @@ class Setup:
 
     image: str  #: value of the board's option ``firmware``
     scenario: Scenario
+
+
+def marked(image: str, scenario: Scenario) -> str:
+    """The image with its hash, so that a worker elsewhere rejects another one."""
+    path = Path(image)
+    rig = Rig(Setup(str(path.absolute()) if path.exists() else image, scenario))
+    try:
+        return rig.board.firmware
+    finally:
+        rig.close()
 
 
 class Host:
@@ -195,10 +206,10 @@ class Rig:
             return self._telecommand(step.telecommand)
         self.host.drop()
         self.host.write(_bytes(step.send))
-        answer, refusal = _bytes(step.answer), _bytes(step.refusal)
+        answer, refused = _bytes(step.answer), _bytes(step.refused)
 
         def ended(data: bytes) -> bool:
-            return answer in data or bool(refusal and refusal in data)
+            return answer in data or bool(refused and refused in data)
 
         data = self.host.read_until(ended, self.scenario.timeout_s)
         return SILENT if data is None else OBEYED if answer in data else REFUSED

@@ -11,7 +11,10 @@ from cubestack.host.studies.powerfail.trial import Row, Tester
 from cubestack.host.studies.workers import performed
 
 BLOCK = 40
-"""Cases that a worker tries in sequence."""
+"""Most cases that a worker tries in sequence."""
+
+BLOCKS = 4
+"""Least number of blocks for each worker."""
 
 
 @dataclass(frozen=True)
@@ -26,16 +29,17 @@ class Block:
 def run(
     setup: Setup, course: Course, cases: list[Case], workers: int, scheduler: str | None = None
 ) -> Iterator[list[Row]]:
-    """Rows of each block of cases, as they are done."""
+    """Rows of each case, with those of its second cuts, as they are done."""
+    size = max(1, min(BLOCK, len(cases) // (BLOCKS * workers)))
     blocks = [
-        Block(setup, course, tuple(cases[first : first + BLOCK]))
-        for first in range(0, len(cases), BLOCK)
+        Block(setup, course, tuple(cases[first : first + size]))
+        for first in range(0, len(cases), size)
     ]
-    for _, rows in performed(try_block, blocks, workers, scheduler):
-        yield rows
+    for _, groups in performed(try_block, blocks, workers, scheduler):
+        yield from groups
 
 
-def try_block(block: Block) -> list[Row]:
+def try_block(block: Block) -> list[list[Row]]:
     tester = Tester(block.setup, block.course, fresh_rig(block.setup))
     return list(tester.perform(block.cases))
 

@@ -54,7 +54,7 @@ class Step(DeclaredValues):
 
     send: str = text("", "text to send; each character is a byte", instead=("telecommand",))
     answer: str = text("", "text that the device sends when it has obeyed")
-    refusal: str = text("", "text that the device sends instead if it cannot obey")
+    refused: str = text("", "text that the device sends instead if it cannot obey")
     telecommand: str = text(
         "", "telecommand and its parameters, as the shell takes them", instead=("send",)
     )

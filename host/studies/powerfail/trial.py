@@ -1,6 +1,6 @@
 """Tries cases: cuts the supply of a copy of a device, powers it up, and asks it."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from cubestack.emulator.iss.brown_out import Dip, dip_of, volts_at
 from cubestack.emulator.iss.flash_changes import PAGE_BYTES, FlashContents, FlashOperation
-from cubestack.host.studies.copies import in_copy
+from cubestack.host.studies.copies import CopyError, in_copy
 from cubestack.host.studies.powerfail.cases import (
     BROWN_OUT,
     WORN,
@@ -23,6 +23,7 @@ from cubestack.host.studies.powerfail.scenario import Answers
 
 RIGHT = "right"
 MIXED, FORGOTTEN, WRONG, UNSTABLE, STUCK = "mixed", "forgotten", "wrong", "unstable", "stuck"
+FAILED = "failed"
 
 MEANINGS = {
     RIGHT: "the device remembers what it must, and goes on",
@@ -31,6 +32,7 @@ MEANINGS = {
     MIXED: "it remembers parts of two states",
     WRONG: "it remembers what never was",
     UNSTABLE: "it remembers something else after another power-up",
+    FAILED: "the emulator did not finish the case",
     STUCK: "it does not obey the next command, or forgets its effect",
 }
 
@@ -65,7 +67,7 @@ class Row:
     operation: int  #: of the course
     address: int  #: of the flash that it changes; -1 for none
     erases: bool
-    pc: int  #: of the instruction that began the operation
+    where: str  #: instruction that began the operation
     time_s: float  #: of the cut, since power-up
     share: float | None  #: of the operation that was done
     verdict: str
@@ -112,16 +114,16 @@ class Tester:
         self._start = FlashContents.of(fresh.machine)
         self._cursor = Cursor(self._start, course.operations)
 
-    def perform(self, cases: Iterable[Case]) -> Iterator[Row]:
-        """Try them in their order, each with its second cuts."""
+    def perform(self, cases: Iterable[Case]) -> Iterator[list[Row]]:
+        """Try them; yields the rows of each case, its second cuts behind it."""
         dips = list[Case]()
         for case in cases:
             if case.kind == BROWN_OUT:
                 dips.append(case)
             elif case.kind == WORN:
-                yield self._row(case, in_copy(partial(self._wear, self._fresh, case)))
+                yield [self.row(case, _tried(partial(self.wear, self._fresh, case)))]
             else:
-                yield from self._cut(case)
+                yield list(self._cut(case))
         yield from self._brown_outs(dips)
 
     def contents(self, case: Case) -> FlashContents:
@@ -139,17 +141,22 @@ class Tester:
 
     def _cut(self, case: Case) -> Iterator[Row]:
         contents = self.contents(case)
-        outcome = in_copy(partial(self.recover, self._fresh, contents, case, 1))
-        yield self._row(case, outcome)
+        outcome = _tried(partial(self.recover, self._fresh, contents, case))
+        yield self.row(case, outcome)
         for second in second_cuts(self._scenario, case, outcome.recovery):
             again = self.second_contents(case, outcome.recovery, second)
-            purpose = 3 + 2 * second.number
-            found = in_copy(partial(self.recover, self._fresh, again, case, purpose))
-            yield self._row(case, found, second)
+            found = _tried(partial(self.recover, self._fresh, again, case, second))
+            yield self.row(case, found, second)
 
-    def recover(self, rig: Rig, contents: FlashContents, case: Case, purpose: int) -> Outcome:
+    def recovery(self, case: Case) -> list[FlashOperation]:
+        """What the device writes to its flash when it is powered up after a case's first cut."""
+        return _tried(partial(self.recover, self._fresh, self.contents(case), case)).recovery
+
+    def recover(
+        self, rig: Rig, contents: FlashContents, case: Case, second: SecondCut | None = None
+    ) -> Outcome:
         """Power a device up with this flash, and examine it."""
-        rng = self.random(case, purpose)
+        rng = self.random(case, 1 if second is None else 3 + 2 * second.number)
         rig.flash_operations()
         rig.power_up(contents, rng)
         return self.examine(rig, case, rng)
@@ -204,7 +211,7 @@ class Tester:
 
     # Brown-outs
 
-    def _brown_outs(self, cases: Sequence[Case]) -> Iterator[Row]:
+    def _brown_outs(self, cases: Sequence[Case]) -> Iterator[list[Row]]:
         """Cases in the order of their time: copies of a device that runs the scenario."""
         if not cases:
             return
@@ -214,7 +221,7 @@ class Tester:
             starts = [(max(0, case.time_ps - self._dip(case).reset_ps), case) for case in cases]
             for start, case in sorted(starts, key=lambda one: (one[0], one[1].number)):
                 player.play(start)
-                yield self._row(case, in_copy(partial(self._dip_at, player, case)))
+                yield [self.row(case, _tried(partial(self.brown_out, player, case)))]
         finally:
             rig.close()
 
@@ -223,7 +230,10 @@ class Tester:
         assert found is not None
         return found
 
-    def _dip_at(self, player: "Player", case: Case) -> Outcome:
+    def brown_out(
+        self, player: "Player", case: Case, at_cut: Callable[[], None] = lambda: None
+    ) -> Outcome:
+        """Let the supply dip; ``at_cut`` is called at the instruction where the reset begins."""
         rng, curve = self.random(case, 1), self._scenario.brown_out[case.curve].curve
         dip, rig = self._dip(case), player.rig
         start = case.time_ps - dip.reset_ps
@@ -236,6 +246,7 @@ class Tester:
                 player.play(at)
                 _set_supply(rig, volts)
         player.play(case.time_ps)
+        at_cut()
         contents = self._torn(rig, case)
         contents.load(rig.machine)
         rig.restart(dip.cause)
@@ -264,14 +275,18 @@ class Tester:
 
     # Worn pages
 
-    def _wear(self, rig: Rig, case: Case) -> Outcome:
-        """Run the scenario with cells that keep their value from one step on."""
+    def wear(self, rig: Rig, case: Case, at_wear: Callable[[], None] = lambda: None) -> Outcome:
+        """Run the scenario with cells that keep their value from one step on.
+
+        ``at_wear`` is called when that step begins.
+        """
         rng, step_at = self.random(case, 1), self._course.step_at(case.time_ps)
         states, may = self._course.states, [{one} for one in self._course.states[0]]
         rig.await_start()
         for place, step in enumerate(self._scenario.step):
             if place == step_at:
                 self._wear_out(rig, case, rng)
+                at_wear()
             answer = rig.perform(step)
             if answer == SILENT:
                 return Outcome(SILENT, (), f"step {place + 1} has no answer")
@@ -300,7 +315,7 @@ class Tester:
         for address in rng.choice(words, min(WORN_WORDS, len(words)), replace=False):
             rig.machine.wear_out(int(address), 1 << int(rng.integers(32)))
 
-    def _row(self, case: Case, outcome: Outcome, second: SecondCut | None = None) -> Row:
+    def row(self, case: Case, outcome: Outcome, second: SecondCut | None = None) -> Row:
         place = case.cut.operation
         known = self._course.operations
         first = known[place].first if place < len(known) else None
@@ -311,7 +326,7 @@ class Tester:
             place,
             -1 if first is None else first.address,
             first is not None and first.erased,
-            -1 if first is None else first.pc,
+            "" if first is None else self._fresh.symbols.describe(first.pc),
             case.time_ps / 1e12,
             cut.share,
             outcome.verdict,
@@ -320,6 +335,14 @@ class Tester:
             outcome.detail,
             second is not None,
         )
+
+
+def _tried(act: Callable[[], Outcome]) -> Outcome:
+    """Outcome of ``act`` in a copy of this process."""
+    try:
+        return in_copy(act)
+    except CopyError as error:
+        return Outcome(FAILED, (), str(error))
 
 
 class Player:
