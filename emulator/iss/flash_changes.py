@@ -31,13 +31,12 @@ class FlashChange(NamedTuple):
     before: int  #: contents of a word
     after: int  #: contents of a word
     pc: int  #: of the instruction that was running at the start
-    erased: bool  #: whether pages were erased
+    erased: int  #: whether pages were erased
 
     @classmethod
     def of(cls, record: Any) -> Self:
         """From ``FlashChangeRecord``."""
-        *first, erased = (getattr(record, name) for name, _ in record._fields_)
-        return cls(*first, bool(erased))
+        return cls._make(getattr(record, name) for name, _ in record._fields_)
 
 
 @dataclass(frozen=True)

@@ -113,6 +113,6 @@ void save_config(void)
 
 void erase_config(void)
 {
-    flash_erase(PAGE_CONFIG);
+    flash_erase(PAGE_CONFIG, sizeof retained.setting_words);
     memcpy(retained.settings, settings_reset, SETTINGS_BYTES);
 }

@@ -17,9 +17,13 @@
 
 #define IN_RAM __attribute__((section(".ram_code"), noinline, long_call))
 
-static const volatile uint32_t *words_of(enum flash_page page)
+/* A page has two banks, so that the latest contents survive a cut of the power while new ones are
+ * written: sequence number, words, check word over both. */
+#define BANKS 2u
+
+static const volatile uint32_t *bank_of(enum flash_page page, unsigned bank)
 {
-    return (const volatile uint32_t *)(FLASH_END - (page + 1u) * PAGE_BYTES);
+    return (const volatile uint32_t *)(FLASH_END - (BANKS * page + bank + 1u) * PAGE_BYTES);
 }
 
 static uint32_t check_of(uint32_t check, uint32_t word)
@@ -27,16 +31,32 @@ static uint32_t check_of(uint32_t check, uint32_t word)
     return (check << 5 | check >> 27) ^ word;
 }
 
+static bool is_whole(const volatile uint32_t *bank, unsigned size)
+{
+    uint32_t check = CHECK_SEED;
+    for (unsigned i = 0; i <= size / 4; i++)
+        check = check_of(check, bank[i]);
+    return bank[size / 4 + 1] == check;
+}
+
+/* The bank with the latest contents; BANKS if there are none. */
+static unsigned latest_bank(enum flash_page page, unsigned size)
+{
+    unsigned latest = BANKS;
+    for (unsigned bank = 0; bank < BANKS; bank++)
+        if (is_whole(bank_of(page, bank), size) &&
+            (latest == BANKS || (int32_t)(*bank_of(page, bank) - *bank_of(page, latest)) > 0))
+            latest = bank;
+    return latest;
+}
+
 bool flash_load(enum flash_page page, void *words, unsigned size)
 {
-    const volatile uint32_t *stored = words_of(page);
-    uint32_t check = CHECK_SEED;
-    for (unsigned i = 0; i < size / 4; i++)
-        check = check_of(check, stored[i]);
-    if (stored[size / 4] != check)
+    unsigned bank = latest_bank(page, size);
+    if (bank == BANKS)
         return false;
     for (unsigned i = 0; i < size / 4; i++)
-        ((uint32_t *)words)[i] = stored[i];
+        ((uint32_t *)words)[i] = bank_of(page, bank)[i + 1];
     return true;
 }
 
@@ -67,23 +87,35 @@ static void end(void)
     MSC->LOCK = 0;
 }
 
-void flash_erase(enum flash_page page)
+static void erase_bank(enum flash_page page, unsigned bank)
 {
     begin();
-    run_command((uint32_t)words_of(page), 0, MSC_WRITECMD_ERASEPAGE);
+    run_command((uint32_t)bank_of(page, bank), 0, MSC_WRITECMD_ERASEPAGE);
     end();
+}
+
+/* The latest contents go last: a cut must not bring back older ones. */
+void flash_erase(enum flash_page page, unsigned size)
+{
+    unsigned latest = latest_bank(page, size) % BANKS;
+    erase_bank(page, 1u - latest);
+    erase_bank(page, latest);
 }
 
 void flash_store(enum flash_page page, const void *words, unsigned size)
 {
-    uint32_t address = (uint32_t)words_of(page), check = CHECK_SEED;
-    flash_erase(page);
+    unsigned latest = latest_bank(page, size);
+    uint32_t sequence = latest == BANKS ? 0 : *bank_of(page, latest) + 1u;
+    unsigned bank = latest == 0;
+    uint32_t address = (uint32_t)bank_of(page, bank), check = check_of(CHECK_SEED, sequence);
+    erase_bank(page, bank);
     begin();
+    run_command(address, sequence, MSC_WRITECMD_WRITEONCE);
     for (unsigned i = 0; i < size / 4; i++) {
         uint32_t word = ((const uint32_t *)words)[i];
         check = check_of(check, word);
-        run_command(address + 4 * i, word, MSC_WRITECMD_WRITEONCE);
+        run_command(address + 4 * (i + 1), word, MSC_WRITECMD_WRITEONCE);
     }
-    run_command(address + size, check, MSC_WRITECMD_WRITEONCE);
+    run_command(address + size + 4, check, MSC_WRITECMD_WRITEONCE);
     end();
 }

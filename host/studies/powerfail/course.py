@@ -22,6 +22,7 @@ class Course:
         started: when each step began.
         settled: when what each step changes must be remembered.
         states: answers after a power-up before the first step and after each step.
+        running: answers of the running device then, which may include what a power-up loses.
         end_ps: end of the last step.
     """
 
@@ -30,6 +31,7 @@ class Course:
     started: tuple[int, ...]
     settled: tuple[int, ...]
     states: tuple[Answers, ...]
+    running: tuple[Answers, ...]
     end_ps: int
 
     def allowed(self, time_ps: int) -> range:
@@ -55,7 +57,7 @@ def learn(setup: Setup, fresh: Rig) -> Course:
     try:
         before = FlashContents.of(rig.machine)
         rig.await_start()
-        states = [_remembered(fresh, rig, 0)]
+        states, running = [_remembered(fresh, rig, 0)], [in_copy(rig.ask)]
         started, settled = list[int](), list[int]()
         for place, step in enumerate(scenario.step, start=1):
             rig.host.drop()
@@ -66,12 +68,20 @@ def learn(setup: Setup, fresh: Rig) -> Course:
             rig.emulated.wait(step.settle_s)
             settled.append(rig.kernel.now)
             states.append(_remembered(fresh, rig, place))
+            running.append(in_copy(rig.ask))
             _compare(scenario, place, states[-1])
         done = tuple(rig.flash_operations())
         if not contents_after(before, done).same_as(rig.machine):
             raise RuntimeError("the flash changed without an operation of its controller")
-        sent = tuple(rig.host.sent)
-        return Course(done, sent, tuple(started), tuple(settled), tuple(states), rig.kernel.now)
+        return Course(
+            done,
+            tuple(rig.host.sent),
+            tuple(started),
+            tuple(settled),
+            tuple(states),
+            tuple(running),
+            rig.kernel.now,
+        )
     finally:
         rig.close()
 

@@ -138,4 +138,4 @@ def _replay_second(
     witness.at_cut(rig)
     rig.kernel.advance_to(second.time_ps)
     contents = tester.second_contents(case, recovery, second)
-    return tester.row(case, tester.recover(rig, contents, case, second), second)
+    return tester.row(case, tester.recover(rig, contents, case, second), second, recovery)

@@ -69,10 +69,12 @@ def findings(rows: Iterable[Row]) -> list[Row]:
 
 def told(row: Row) -> str:
     """A finding in one line."""
-    place = f"operation {row.operation} at {row.address:#010x}" if row.address >= 0 else "the end"
-    what = "erasure" if row.erases else "word"
-    parts = [f"case {row.case}: {row.verdict}", f"{row.kind} {place} ({what})"]
-    return "; ".join([*parts, row.detail, row.where])
+    what = "erasure of" if row.erases else "word"
+    place = f"{what} {row.address:#010x}" if row.address >= 0 else "the end"
+    share = "" if row.share is None else f", {row.share:.0%} done"
+    kind = "in the recovery" if row.second else row.kind
+    parts = [f"case {row.case}: {row.verdict}", f"{kind}, {place}{share}", row.detail, row.where]
+    return "; ".join(filter(None, parts))
 
 
 def _page(setup: Setup, course: Course, rows: Sequence[Row]) -> str:

@@ -198,7 +198,7 @@ class Rig:
         missing = [name for name in fields if name not in values]
         if missing:
             raise ScenarioError(f"{frame} has no field {missing[0]!r}, only {', '.join(values)}")
-        return " ".join(f"{name}={values[name]}" for name in fields or values)
+        return " ".join(f"{name}={values[name]!s}" for name in fields or values)
 
     def perform(self, step: Step) -> str:
         """Send a command; returns ``OBEYED``, ``REFUSED`` or ``SILENT``."""

@@ -5,9 +5,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Self
+from typing import Self
 
-from cubestack.emulator.iss.brown_out import SUPPLY_V
+from cubestack.emulator.iss.brown_out import FALLING_V, SUPPLY_V, dip_of
 from cubestack.firmware_model.values import (
     REQUIRED,
     TABLE,
@@ -93,6 +93,8 @@ class BrownOut(DeclaredValues):
             raise ScenarioError("curve must have two corners or more, at rising times")
         if any(not 0 <= volts <= SUPPLY_V[1] for _, volts in self.curve):
             raise ScenarioError(f"curve must stay between 0 and {SUPPLY_V[1]} V")
+        if dip_of(self.curve) is None:
+            raise ScenarioError(f"curve never falls below {FALLING_V} V, where the part resets")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,8 +151,3 @@ class Scenario(DeclaredValues):
 
 Answers = tuple[str | None, ...]
 """To the questions of a scenario in their order; None for no answer."""
-
-
-def shown(answers: Answers) -> list[Any]:
-    """As JSON has them."""
-    return list(answers)

@@ -8,6 +8,7 @@ import numpy as np
 
 from cubestack.emulator.iss.brown_out import Dip, dip_of, volts_at
 from cubestack.emulator.iss.flash_changes import PAGE_BYTES, FlashContents, FlashOperation
+from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S
 from cubestack.host.studies.copies import CopyError, in_copy
 from cubestack.host.studies.powerfail.cases import (
     BROWN_OUT,
@@ -65,9 +66,9 @@ class Row:
     case: str  #: number, behind a dot that of a second cut
     kind: str
     operation: int  #: of the course
-    address: int  #: of the flash that it changes; -1 for none
+    address: int  #: of the flash that the cut operation changes; -1 for none
     erases: bool
-    where: str  #: instruction that began the operation
+    where: str  #: instruction that begins that operation
     time_s: float  #: of the cut, since power-up
     share: float | None  #: of the operation that was done
     verdict: str
@@ -146,7 +147,7 @@ class Tester:
         for second in second_cuts(self._scenario, case, outcome.recovery):
             again = self.second_contents(case, outcome.recovery, second)
             found = _tried(partial(self.recover, self._fresh, again, case, second))
-            yield self.row(case, found, second)
+            yield self.row(case, found, second, outcome.recovery)
 
     def recovery(self, case: Case) -> list[FlashOperation]:
         """What the device writes to its flash when it is powered up after a case's first cut."""
@@ -161,51 +162,62 @@ class Tester:
         rig.power_up(contents, rng)
         return self.examine(rig, case, rng)
 
-    def examine(self, rig: Rig, case: Case, rng: np.random.Generator) -> Outcome:
-        """Ask a device that starts, ask it again after a power-up, and let it go on."""
+    def examine(
+        self, rig: Rig, case: Case, rng: np.random.Generator, *, kept: bool = False
+    ) -> Outcome:
+        """Ask a device that starts, ask it again after a power-up, and let it go on.
+
+        ``kept``: RAM kept its contents, so the device may answer as it did before the reset.
+        """
         rig.await_start()
         answers = rig.ask()
         recovery = rig.flash_operations()
-        verdict, detail, state = self._judge(answers, case.time_ps)
+        allowed = self._course.allowed(case.time_ps)
+        if kept and answers in self._course.running[allowed.start : allowed.stop]:
+            verdict, detail = RIGHT, ""
+        else:
+            verdict, detail = self._judge(answers, allowed)
         if verdict == RIGHT:
-            verdict, detail = self._follow(rig, answers, state, rng)
+            verdict, detail = self._follow(rig, None if kept else answers, allowed, rng)
         return Outcome(verdict, answers, detail, recovery)
 
-    def _judge(self, answers: Answers, time_ps: int) -> tuple[str, str, int]:
-        """Verdict, what is wrong, and the index of the state."""
-        states, allowed = self._course.states, self._course.allowed(time_ps)
-        silent = [
-            one.name
-            for one, answer in zip(self._scenario.question, answers, strict=True)
-            if answer is None
-        ]
-        if silent:
-            return SILENT, f"no answer to {', '.join(silent)}", 0
-        for state in allowed:
-            if answers == states[state]:
-                return RIGHT, "", state
+    def _judge(self, answers: Answers, allowed: range) -> tuple[str, str]:
+        """Verdict, and what is wrong."""
+        states = self._course.states
+        right = [states[state] for state in allowed]
+        if answers in right:
+            return RIGHT, ""
+        if None in answers:
+            questions = zip(self._scenario.question, answers, strict=True)
+            silent = ", ".join(one.name for one, answer in questions if answer is None)
+            return SILENT, f"no answer to {silent}"
         if answers in states[: allowed.start]:
-            return FORGOTTEN, f"as after step {states.index(answers)} of {allowed.start}", 0
-        parts = zip(answers, *(states[state] for state in allowed), strict=True)
-        if all(answer in known for answer, *known in parts):
-            return MIXED, f"parts of {len(allowed)} states", 0
-        return WRONG, "a state that never was", 0
+            return FORGOTTEN, f"as after step {states.index(answers)} of {allowed.start}"
+        if all(answer in known for answer, *known in zip(answers, *right, strict=True)):
+            return MIXED, f"parts of {len(right)} states"
+        return WRONG, "a state that never was"
 
     def _follow(
-        self, rig: Rig, answers: Answers, state: int, rng: np.random.Generator
+        self, rig: Rig, answers: Answers | None, allowed: range, rng: np.random.Generator
     ) -> tuple[str, str]:
-        again = _cycle(rig, rng)
-        if again != answers:
+        """Power the device up again, repeat the step that was cut, and power it up once more."""
+        again, states = _cycle(rig, rng), self._course.states
+        if answers not in (None, again) or self._judge(again, allowed)[0] != RIGHT:
             return UNSTABLE, f"after another power-up {_told(again)}"
+        state = next(one for one in allowed if states[one] == again)
         if state == len(self._scenario.step):
             return RIGHT, ""
-        step = self._scenario.step[state]
-        answer = rig.perform(step)
-        if answer != OBEYED:
-            return STUCK, f"step {state + 1}, repeated, is {answer}"
-        rig.emulated.wait(step.settle_s)
+        first = state  # steps before it that only change RAM must be repeated too
+        while first and states[first - 1] == again:
+            first -= 1
+        for place in range(first, state + 1):
+            step = self._scenario.step[place]
+            answer = rig.perform(step)
+            if answer != OBEYED:
+                return STUCK, f"step {place + 1}, repeated, is {answer}"
+            rig.emulated.wait(step.settle_s)
         after = _cycle(rig, rng)
-        if after != self._course.states[state + 1]:
+        if after != states[state + 1]:
             return STUCK, f"after step {state + 1}, repeated, {_told(after)}"
         return RIGHT, ""
 
@@ -238,7 +250,7 @@ class Tester:
         dip, rig = self._dip(case), player.rig
         start = case.time_ps - dip.reset_ps
         supply = [
-            (start + round(ms * 1e9), volts_at(curve, ms))
+            (start + round(ms * PS_PER_MS), volts_at(curve, ms))
             for ms in np.linspace(curve[0][0], curve[-1][0], SUPPLY_STEPS).tolist()
         ]
         for at, volts in supply:
@@ -262,7 +274,7 @@ class Tester:
         else:
             rig.restart(dip.cause)
         _set_supply(rig, supply[-1][1])
-        return self.examine(rig, case, rng)
+        return self.examine(rig, case, rng, kept=not dip.forgets)
 
     def _torn(self, rig: Rig, case: Case) -> FlashContents:
         """The flash now, with the operation that is under way torn."""
@@ -281,7 +293,8 @@ class Tester:
         ``at_wear`` is called when that step begins.
         """
         rng, step_at = self.random(case, 1), self._course.step_at(case.time_ps)
-        states, may = self._course.states, [{one} for one in self._course.states[0]]
+        states, last = self._course.states, 0
+        allowed = [states[0]]
         rig.await_start()
         for place, step in enumerate(self._scenario.step):
             if place == step_at:
@@ -291,17 +304,16 @@ class Tester:
             if answer == SILENT:
                 return Outcome(SILENT, (), f"step {place + 1} has no answer")
             rig.emulated.wait(step.settle_s)
-            for known, before, after in zip(may, states[place], states[place + 1], strict=True):
-                if before != after and answer == OBEYED:
-                    known.clear()
-                if before != after:
-                    known.add(after)
+            last, allowed = place + 1, [states[place + 1]]
+            if answer != OBEYED:  # what later steps store is not what they store in the course
+                allowed = [states[place], states[place + 1]]
+                break
         answers = _cycle(rig, rng)
         if None in answers:
             return Outcome(SILENT, answers, "no answer after a power-up")
-        if all(answer in known for answer, known in zip(answers, may, strict=True)):
+        if answers in allowed:
             return Outcome(RIGHT, answers)
-        return Outcome(FORGOTTEN, answers, "it acknowledged what it could not store")
+        return Outcome(FORGOTTEN, answers, f"not as after step {last}, with worn cells")
 
     def _wear_out(self, rig: Rig, case: Case, rng: np.random.Generator) -> None:
         page = self._course.operations[case.cut.operation].first.address
@@ -315,25 +327,32 @@ class Tester:
         for address in rng.choice(words, min(WORN_WORDS, len(words)), replace=False):
             rig.machine.wear_out(int(address), 1 << int(rng.integers(32)))
 
-    def row(self, case: Case, outcome: Outcome, second: SecondCut | None = None) -> Row:
-        place = case.cut.operation
-        known = self._course.operations
-        first = known[place].first if place < len(known) else None
-        cut = case.cut if second is None else second.cut
+    def row(
+        self,
+        case: Case,
+        outcome: Outcome,
+        second: SecondCut | None = None,
+        recovery: Sequence[FlashOperation] = (),
+    ) -> Row:
+        """The row of a case, or of a second cut during ``recovery``."""
+        cut, operations = (
+            (case.cut, self._course.operations) if second is None else (second.cut, recovery)
+        )
+        hit = operations[cut.operation].first if cut.operation < len(operations) else None
         return Row(
-            f"{case.number}" if second is None else f"{case.number}.{second.number}",
-            case.kind,
-            place,
-            -1 if first is None else first.address,
-            first is not None and first.erased,
-            "" if first is None else self._fresh.symbols.describe(first.pc),
-            case.time_ps / 1e12,
-            cut.share,
-            outcome.verdict,
-            outcome.answers,
-            tuple(self._course.states[one] for one in self._course.allowed(case.time_ps)),
-            outcome.detail,
-            second is not None,
+            case=f"{case.number}" if second is None else f"{case.number}.{second.number}",
+            kind=case.kind,
+            operation=case.cut.operation,
+            address=-1 if hit is None else hit.address,
+            erases=hit is not None and hit.erased,
+            where="" if hit is None else self._fresh.symbols.describe(hit.pc),
+            time_s=case.time_ps / PS_PER_S,
+            share=cut.share,
+            verdict=outcome.verdict,
+            answers=outcome.answers,
+            allowed=tuple(self._course.states[one] for one in self._course.allowed(case.time_ps)),
+            detail=outcome.detail,
+            second=second is not None,
         )
 
 
