@@ -8,13 +8,10 @@ some of them changed; here each cell's time is drawn evenly from the duration of
 from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import groupby
-from typing import TYPE_CHECKING, Any, NamedTuple, Self
+from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
-
-if TYPE_CHECKING:
-    from cubestack.emulator.iss.machine import Machine
 
 PAGE_BYTES = 4096
 INFORMATION_BASE, PAGE_STEP = 0x0FE0_0000, 0x4000
@@ -67,6 +64,15 @@ def operations(changes: Iterable[FlashChange]) -> list[FlashOperation]:
     return [FlashOperation(tuple(group)) for _, group in grouped]
 
 
+class FlashMachine(Protocol):
+    """What has the flash: a machine."""
+
+    flash: NDArray[np.uint8]
+    information: NDArray[np.uint8]
+
+    def invalidate(self, address: int, count: int) -> None: ...
+
+
 @dataclass(frozen=True)
 class FlashContents:
     """Flash (bytes from address 0) and pages of information of a machine."""
@@ -75,14 +81,14 @@ class FlashContents:
     information: NDArray[np.uint8]
 
     @classmethod
-    def of(cls, machine: "Machine") -> "FlashContents":
+    def of(cls, machine: FlashMachine) -> "FlashContents":
         """A copy of what the machine has."""
         return cls(machine.flash.copy(), machine.information.copy())
 
     def copy(self) -> "FlashContents":
         return FlashContents(self.flash.copy(), self.information.copy())
 
-    def load(self, machine: "Machine") -> None:
+    def load(self, machine: FlashMachine) -> None:
         """Put these contents into a machine."""
         machine.flash[:], machine.information[:] = self.flash, self.information
         machine.invalidate(0, machine.flash.size)
@@ -111,7 +117,7 @@ class FlashContents:
                 after = np.frombuffer(change.after.to_bytes(4, "little"), np.uint8)
                 cells &= ~(fast & ~after)
 
-    def same_as(self, machine: "Machine") -> bool:
+    def same_as(self, machine: FlashMachine) -> bool:
         """Whether the machine has these contents."""
         return np.array_equal(self.flash, machine.flash) and np.array_equal(
             self.information, machine.information

@@ -116,7 +116,7 @@ class Scenario(DeclaredValues):
     question: tuple[Question, ...] = table(
         REQUIRED, "what the device is asked after a power-up", Question, array=True
     )
-    step: tuple[Step, ...] = table(REQUIRED, "what the device is told, in order", Step, array=True)
+    step: tuple[Step, ...] = table(REQUIRED, "commands to the device, in order", Step, array=True)
     brown_out: tuple[BrownOut, ...] = table(
         (), "dips of the supply, tried at each operation", BrownOut, array=True
     )

@@ -22,6 +22,7 @@ LEFT = {
     r"/dev/ttyUSB0|\./tty": "a port that another program serves",
     r"^ground run\.rec": "a recording of such a port",
     r"program\.elf|picture\.elf": "firmware: tests/system/firmware/test_own_firmware.py",
+    r"settings\.elf": "firmware: tests/host/studies/powerfail/test_settings_store.py",
     r"sky\.jpg|night/|bench/": "needs photographs",
     r"qemu-system-arm|\./star_tracker": "programs of others: tests/system/serial_programs",
     r"flight": "the reader's flight software",
@@ -73,12 +74,13 @@ def own_call(words: list[str]) -> str | None:
 
 def reader_files() -> dict[str, str]:
     """Files that the documents name, with the content that they show."""
-    pages = (("unit", "calibration.md"), ("plan", "faults.md"), ("false-stars", "campaigns.md"))
+    pages = {"unit": "calibration", "plan": "faults", "false-stars": "campaigns"}
+    pages |= {"save": "powerfail"}
     texts = {
         f"{name}.toml": next(
-            one.text for one in BLOCKS if one.document == page and one.language == "toml"
+            one.text for one in BLOCKS if one.document == f"{page}.md" and one.language == "toml"
         )
-        for name, page in pages
+        for name, page in pages.items()
     }
     sky = 'kind = "sky"\nra_deg = 83.8\ndec_deg = -5.4\n'
     return texts | {"sky.toml": sky, "drift.toml": sky, "sun.toml": 'kind = "earth-sun"\n'}

@@ -71,7 +71,7 @@ def learned(image: Path, scenario: Scenario) -> tuple[Setup, Course, list[Case]]
 
 
 def tried(image: Path, scenario: Scenario, every: int = 1) -> Iterator[Row]:
-    """Rows of every so many cases, in this process."""
+    """Rows of one case in ``every``, in this process."""
     setup, course, cases = learned(image, scenario)
     for rows in run(setup, course, cases[::every], workers=1):
         yield from rows
