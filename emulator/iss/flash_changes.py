@@ -90,8 +90,11 @@ class FlashContents:
 
     def load(self, machine: FlashMachine) -> None:
         """Put these contents into a machine."""
-        machine.flash[:], machine.information[:] = self.flash, self.information
-        machine.invalidate(0, machine.flash.size)
+        machine.information[:] = self.information
+        ours, theirs = (one.reshape(-1, PAGE_BYTES) for one in (self.flash, machine.flash))
+        for page in np.flatnonzero((ours != theirs).any(axis=1)).tolist():
+            theirs[page] = ours[page]
+            machine.invalidate(page * PAGE_BYTES, PAGE_BYTES)
 
     def apply(self, operation: FlashOperation) -> None:
         """Change them as the completed operation does."""

@@ -17,9 +17,10 @@
 
 #define IN_RAM __attribute__((section(".ram_code"), noinline, long_call))
 
-/* A page has two banks, so that the latest contents survive a cut of the power while new ones are
- * written: sequence number, words, check word over both. */
-#define BANKS 2u
+/* A page has three banks: sequence number, words, check word over both. The bank with the latest
+ * contents is never written, so they survive a cut of the power. The third one is for the case that
+ * another one is worn. */
+#define BANKS 3u
 
 static const volatile uint32_t *bank_of(enum flash_page page, unsigned bank)
 {
@@ -97,25 +98,38 @@ static void erase_bank(enum flash_page page, unsigned bank)
 /* The latest contents go last: a cut must not bring back older ones. */
 void flash_erase(enum flash_page page, unsigned size)
 {
-    unsigned latest = latest_bank(page, size) % BANKS;
-    erase_bank(page, 1u - latest);
-    erase_bank(page, latest);
+    unsigned latest = latest_bank(page, size);
+    for (unsigned bank = 0; bank < BANKS; bank++)
+        if (bank != latest)
+            erase_bank(page, bank);
+    if (latest < BANKS)
+        erase_bank(page, latest);
+}
+
+static void write_bank(enum flash_page page, unsigned bank, uint32_t sequence, const uint32_t *words,
+                       unsigned size)
+{
+    uint32_t address = (uint32_t)bank_of(page, bank), check = check_of(CHECK_SEED, sequence);
+    erase_bank(page, bank);
+    begin();
+    run_command(address, sequence, MSC_WRITECMD_WRITEONCE);
+    for (unsigned i = 0; i < size / 4; i++) {
+        check = check_of(check, words[i]);
+        run_command(address + 4 * (i + 1), words[i], MSC_WRITECMD_WRITEONCE);
+    }
+    run_command(address + size + 4, check, MSC_WRITECMD_WRITEONCE);
+    end();
 }
 
 void flash_store(enum flash_page page, const void *words, unsigned size)
 {
     unsigned latest = latest_bank(page, size);
     uint32_t sequence = latest == BANKS ? 0 : *bank_of(page, latest) + 1u;
-    unsigned bank = latest == 0;
-    uint32_t address = (uint32_t)bank_of(page, bank), check = check_of(CHECK_SEED, sequence);
-    erase_bank(page, bank);
-    begin();
-    run_command(address, sequence, MSC_WRITECMD_WRITEONCE);
-    for (unsigned i = 0; i < size / 4; i++) {
-        uint32_t word = ((const uint32_t *)words)[i];
-        check = check_of(check, word);
-        run_command(address + 4 * (i + 1), word, MSC_WRITECMD_WRITEONCE);
+    for (unsigned bank = 0; bank < BANKS; bank++) {
+        if (bank == latest)
+            continue;
+        write_bank(page, bank, sequence, words, size);
+        if (is_whole(bank_of(page, bank), size) && *bank_of(page, bank) == sequence)
+            break;
     }
-    run_command(address + size + 4, check, MSC_WRITECMD_WRITEONCE);
-    end();
 }

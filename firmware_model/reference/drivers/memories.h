@@ -13,14 +13,14 @@
 
 void external_ram_start(void);
 
-/* Flash pages of the program, each in two banks with a check word, from the end of the flash. What a
+/* Flash pages of the program, each in three banks with a check word, from the end of the flash. What a
  * page had survives a cut of the power while it is stored anew. */
 enum flash_page { PAGE_CONFIG, PAGE_ATTITUDE, PAGE_MODE };
 
 /* Reads whole words; false if the page has none. */
 bool flash_load(enum flash_page page, void *words, unsigned size);
 
-/* Erases and programs the older bank; interrupts are served meanwhile. */
+/* Erases and programs another bank; interrupts are served meanwhile. */
 void flash_store(enum flash_page page, const void *words, unsigned size);
 
 /* `size`: as stored. */

@@ -144,10 +144,11 @@ class Rig:
 
     # Power
 
-    def power_up(self, contents: FlashContents, rng: np.random.Generator) -> None:
-        """Restore the supply: the flash has these contents, RAM random ones."""
+    def power_up(self, contents: FlashContents | None, rng: np.random.Generator) -> None:
+        """Restore the supply: the flash has these contents, or its own, and RAM random ones."""
         self.processor.catch_up()
-        contents.load(self.machine)
+        if contents is not None:
+            contents.load(self.machine)
         self.machine.ram[:] = np.frombuffer(rng.bytes(self.machine.ram.size), np.uint8)
         self.restart(POWER_ON)
 

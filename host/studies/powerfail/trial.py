@@ -383,7 +383,7 @@ class Player:
 
 def _cycle(rig: Rig, rng: np.random.Generator) -> Answers:
     """Answers after a cut while nothing happens."""
-    rig.power_up(FlashContents.of(rig.machine), rng)
+    rig.power_up(None, rng)
     rig.await_start()
     return rig.ask()
 
