@@ -114,7 +114,6 @@ def test_findings_replay_to_the_instruction(images: Images, fault: int) -> None:
     class Pc(Witness):
         def at_cut(self, rig: Rig) -> None:
             self.pc = rig.machine.register("pc")
-            self.words = len(rig.flash_operations())
 
     setup, course, cases = learned(images[fault], Scenario.read(SCENARIO))
     symbols = Symbols(images[fault].read_bytes())
