@@ -41,7 +41,7 @@ class Witness:
 def _approach(rig: Rig, operation: FlashOperation, run: Callable[[int], None]) -> None:
     """Run up to the instruction that begins an operation, which takes a few cycles itself."""
     for cycles in range(LONGEST_STORE, 0, -1):
-        run(operation.time_ps - cycles * PS_PER_S // rig.machine.hz)
+        run(operation.time_ps - cycles * PS_PER_S // rig.machine.hz - 1)  # times are rounded
         if rig.machine.register("pc") == operation.first.pc:
             return
 
