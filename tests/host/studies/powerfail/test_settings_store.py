@@ -150,6 +150,7 @@ def test_a_scenario_that_fails_without_cuts_says_where(images: Images) -> None:
         learned(images[0], silent)
 
 
+@pytest.mark.slow
 def test_command_writes_rows_and_page(images: Images, run: Run, tmp_path: Path) -> None:
     quick = tmp_path / "quick.toml"
     text = SCENARIO.read_text().replace("boot_s", "torn = 1\nworn = 0\nsecond = 1\nboot_s", 1)
