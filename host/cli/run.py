@@ -38,7 +38,7 @@ from cubestack.host.cli import device_options
 from cubestack.host.cli.arguments import add_flag, add_path, add_value
 from cubestack.host.cli.ports import check_linux
 from cubestack.host.devices.i2c_targets import i2c_targets
-from cubestack.host.devices.registry import device, device_names, devices
+from cubestack.host.devices.registry import device, device_names, devices, emulated_names
 from cubestack.host.emulation.emulated import AnyEmulated, open_device
 from cubestack.host.emulation.terminals import PORT, Terminals
 from cubestack.host.options import option_string
@@ -72,7 +72,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--serial",
         dest="on_serial",
         action="append",
-        choices=device_names(),
+        choices=emulated_names(),
         help="device on serial lines instead of I2C; repeatable. {port} is the first one's "
         "pseudo-terminal, {NAME} that of device NAME; its bench line has the suffix .bench",
     )
@@ -87,7 +87,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_path(parser, "--scene", "TOML scene of the one device (default: its own)")
     device_options.add_start_arguments(parser)
-    device_options.add_board_arguments(parser)
+    device_options.add_board_arguments(parser, emulated_names())
     add_value(parser, "hz", whole(STANDARD_HZ, "bus clock in bits per second (default 100000)", 1))
     parser.add_argument(
         "--pace",

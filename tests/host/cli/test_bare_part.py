@@ -1,5 +1,6 @@
 """`cubestack emulate` with the microcontroller alone."""
 
+import sys
 from pathlib import Path
 
 import pytest
@@ -158,6 +159,21 @@ def test_wrong_calls_are_one_line(words: str, app: str, capsys: pytest.CaptureFi
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("cubestack emulate: ")
     assert WRONG[words] in line
+
+
+HOST = """
+import os, sys, tty
+port = os.open(sys.argv[1], os.O_RDWR | os.O_NOCTTY)
+tty.setraw(port)
+os.write(port, b"?")
+sys.exit(3 if os.read(port, 1) == b"o" else 4)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="Linux only")
+def test_host_program_talks_to_the_firmware(app: str) -> None:
+    words = ["--serial", "efm32gg", "--firmware", app, "--quiet"]
+    assert main(["run", *words, "--", sys.executable, "-c", HOST, "{port}"]) == 3
 
 
 def test_needs_firmware(capsys: pytest.CaptureFixture[str]) -> None:
