@@ -224,6 +224,7 @@ class EmulatedDevice(Closable, Generic[BoardT_co, ClientT_co]):
         """
         from cubestack.emulator.i2cdev.adapter import I2cAdapter
         from cubestack.emulator.i2cdev.running import emulated_bus, run_program
+        from cubestack.host.devices.i2c_targets import i2c_targets
 
         adapter = I2cAdapter(self.board.kernel, self.board.i2c_bus)
         words = [str(word) for word in command]
@@ -232,7 +233,13 @@ class EmulatedDevice(Closable, Generic[BoardT_co, ClientT_co]):
             tempfile.TemporaryFile("w+") as output,
             tempfile.TemporaryFile("w+") as errors,
         ):
-            opened = emulated_bus(self.board.kernel, self.board.busy, adapter, Path(folder) / "bus")
+            opened = emulated_bus(
+                self.board.kernel,
+                self.board.busy,
+                adapter,
+                Path(folder) / "bus",
+                i2c_targets([self.device]),
+            )
             try:
                 status = run_program(
                     words,

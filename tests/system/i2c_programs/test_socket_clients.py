@@ -1,7 +1,10 @@
 """The example clients of the bus's socket, without a device file."""
 
+import re
+import socket
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import pytest
@@ -52,6 +55,24 @@ def test_client_reports_a_missing_emulation(client: list[str], tmp_path: Path) -
     outcome = run(*client, tmp_path / "bus", "0x1a")
     assert (outcome.code, outcome.out) == (1, "")
     assert outcome.err.endswith("No such file or directory\n")
+
+
+def test_client_reports_an_emulation_that_ends(client: list[str], tmp_path: Path) -> None:
+    path = tmp_path / "bus"
+    with socket.socket(socket.AF_UNIX) as listening:
+        listening.bind(str(path))
+        listening.listen()
+
+        def end() -> None:
+            with listening.accept()[0] as connection:
+                connection.recv(100)
+
+        ending = threading.Thread(target=end)
+        ending.start()
+        outcome = run(*client, path, "0x1a")
+        ending.join()
+    assert (outcome.code, outcome.out) == (1, "")
+    assert re.search("Input/output error|the emulation has ended", outcome.err)
 
 
 @needs_c
