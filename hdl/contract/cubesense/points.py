@@ -1,19 +1,57 @@
 """Functional coverage of CubeSense's contract."""
 
+from itertools import product
+
+from cubestack.firmware_model.interface.cubesense.fpga import Action, actions, link_shows_enables
 from cubestack.firmware_model.interface.cubesense.pins import PREFIXES
 from cubestack.hdl.contract.points import Coverage, Group
 
 _SIDES = tuple(map(str, PREFIXES))
+_PLACE = {"camera": _SIDES, "memory": _SIDES}
+
+#: Levels of the lines in which both FPGAs are in standby, and each knows it.
+IDLE_ROWS = tuple(
+    levels
+    for levels in product((0, 1), repeat=5)
+    if {*actions(*levels)} == {Action.STANDBY}
+    and (link_shows_enables(*levels[:2]) or levels[3] == levels[4])
+)
 
 POINTS = {
     "image": Group(
-        "a whole image, by side", {"side": _SIDES, "done": ("stored", "read", "aborted")}
+        "a whole image, by camera and memory",
+        {**_PLACE, "done": ("stored", "read", "aborted", "stored beside the other")},
+        lambda camera, memory, done: camera == memory or not done.endswith("other"),
+    ),
+    "border": Group(
+        "a case at a frame's border, by camera and memory",
+        {
+            **_PLACE,
+            "case": (
+                *("joined in a frame", "frame too short", "pause as long as a gap"),
+                *("last row too short", "row too long", "rows after ACK"),
+            ),
+        },
+    ),
+    "edge": Group("edge data that are read, by camera and memory", _PLACE),
+    "sun": Group(
+        "a Sun image, by memory",
+        {
+            "memory": _SIDES,
+            "case": (
+                *("inside", "at the border", "after two bright pixels", "across the end of a row"),
+                *("none", "kept while others are stored"),
+            ),
+        },
     ),
     "read": Group(
         "a read-out, by side and by what the camera's clock does",
         {"side": _SIDES, "camera": ("runs", "stopped")},
     ),
     "standby": Group("images that a camera sends in standby", {"side": _SIDES}),
+    "idle row": Group(
+        "levels of SHIFT, EDGE, RNW, SUNEN and NADEN that are standby", {"levels": IDLE_ROWS}
+    ),
 }
 
 hit = Coverage(POINTS).hit

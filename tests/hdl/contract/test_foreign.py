@@ -55,14 +55,14 @@ BUGS = {
         "wire storing = ENABLE & ~RNW;",
         "wire storing = ENABLE;",
         "no-write-while-reading",
-        "SRAM_WE_N is low while an image is read",
+        "SRAM_WE_N is high while an image is read",
     ),
     "tri-state contention": Bug(
         "data_bus.v",
         "assign SRAM_OE_N = ~reading;",
         "assign SRAM_OE_N = ~ENABLE;",
         "one-driver",
-        "FPGA and SRAM both drive SRAM_D",
+        "FPGA and SRAM never both drive SRAM_D",
     ),
     "metastable crossing": Bug(
         "synchronous_reset.v",

