@@ -35,8 +35,9 @@ if TYPE_CHECKING:
     from cubestack.host.clients.cubesense.client import CubeSense
     from cubestack.host.clients.cubestar.client import CubeStar
     from cubestack.host.devices.device import BoardOption, Device
-    from cubestack.host.devices.registry import device_names
+    from cubestack.host.devices.registry import device_names, emulated_names
     from cubestack.host.emulation.emulated import AnyEmulated, EmulatedDevice
+    from cubestack.host.emulation.firmware import ProgramExit
     from cubestack.host.errors import HostError
     from cubestack.host.experiments.measure import measure
     from cubestack.host.transport.smbus import CubeSMBus
@@ -85,10 +86,12 @@ __all__ = [
     "HostError",
     "PictureScene",
     "Plan",
+    "ProgramExit",
     "SkyScene",
     "__version__",
     "connect",
     "device_names",
+    "emulated_names",
     "load_plan",
     "measure",
     "open_device",
@@ -110,9 +113,11 @@ _HOMES: Final = {
     "HostError": "host.errors",
     "PictureScene": "emulator.scene.sky",
     "Plan": "emulator.faults.plan",
+    "ProgramExit": "host.emulation.firmware",
     "SkyScene": "emulator.scene.sky",
     "connect": "host.targets",
     "device_names": "host.devices.registry",
+    "emulated_names": "host.devices.registry",
     "load_plan": "emulator.faults.plan",
     "measure": "host.experiments.measure",
     "open_device": "host.emulation.emulated",
