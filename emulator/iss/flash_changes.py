@@ -56,7 +56,7 @@ class FlashOperation:
 
     @property
     def erases(self) -> bool:
-        return self.first.erased
+        return bool(self.first.erased)
 
 
 def operations(changes: Iterable[FlashChange]) -> list[FlashOperation]:

@@ -112,7 +112,8 @@ class Rig:
         """
         scenario = setup.scenario
         self.scenario = scenario
-        emulated = open_device(scenario.device, seed=scenario.seed, firmware=setup.image)
+        options = dict(scenario.options or {}) | {"firmware": setup.image}
+        emulated = open_device(scenario.device, seed=scenario.seed, **options)
         self.emulated, self.board, self.kernel = emulated, emulated.board, emulated.board.kernel
         if not isinstance(self.board.processor, FirmwareProcessor):
             raise ScenarioError(f"{scenario.device} runs no image")

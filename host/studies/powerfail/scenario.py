@@ -104,6 +104,9 @@ class Scenario(DeclaredValues):
     error = ScenarioError
 
     device: str = text(REQUIRED, "device whose board runs the program")
+    options: Mapping[str, str] | None = declare(
+        TABLE, None, "further options of its board, as keywords of open_device"
+    )
     line: str = text("", "serial line; by default the device's first one")
     seed: int = whole(0, "seed of everything random", 0)
     ready: str = text("", "text that the device sends when it has started")

@@ -100,6 +100,15 @@ def test_planted_mistake_is_found(images: Images, fault: int, verdict: str) -> N
     assert found.second == (fault == UNSAFE_RECOVERY)
 
 
+def test_the_bare_part_runs_the_same_scenario(images: Images) -> None:
+    options = {"serial": "usart1@PD0,PD1"}
+    bare = replace(Scenario.read(SCENARIO), device="efm32gg", options=options)
+    rows = list(tried(images[0], bare, every=20))
+    assert len(rows) > 7
+    assert [row for row in rows if not row.right] == []
+    assert finding(images[SEQUENCE_FIRST], bare).verdict == FORGOTTEN
+
+
 @pytest.mark.slow
 def test_right_store_survives_every_case(images: Images) -> None:
     scenario = replace(Scenario.read(SCENARIO), seed=1, between=1, worn=9)
