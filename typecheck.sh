@@ -6,7 +6,7 @@ cd "$(dirname "$0")"
 tree=build/typecheck/cubestack
 mkdir -p "$tree"
 for package in hdl firmware_model emulator host; do ln -sfn "../../../$package" "$tree/$package"; done
-for file in host/api/*; do [ -f "$file" ] && ln -sfn "../../../$file" "$tree/${file##*/}"; done
+for file in host/api/*; do ln -sfn "../../../$file" "$tree/${file##*/}"; done
 ln -sfn ../../examples/cubesense_fpga_i2c build/typecheck/cubesense_fpga_i2c
 ln -sfn ../../examples/linear_sun_sensor/linear_sun_sensor build/typecheck/linear_sun_sensor
 MYPYPATH=build/typecheck .venv/bin/python -m mypy \

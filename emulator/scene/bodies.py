@@ -1,6 +1,7 @@
 """Earth, Sun and Moon around a satellite, and how they disturb a camera that looks at the sky."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -40,32 +41,44 @@ class Bodies:
         return hidden_share(float(sun), float(earth), float(apart))
 
     def disturb(self, hazards: tuple[SkyHazard, ...], boresight: Vector) -> tuple[SkyHazard, ...]:
-        """``hazards`` of a star tracker, those of the known bodies replaced."""
-        known = {"earth-limb": self.nadir, "moon": self.moon, "sun-glare": self.sun}
-        others = tuple(one for one in hazards if known.get(one.name) is None)
-        return (*others, *self._nearby(boresight))
+        """``hazards`` of a star tracker, those of the known bodies put in place.
 
-    def _nearby(self, boresight: Vector) -> tuple[SkyHazard, ...]:
-        def near(name: str, direction: Vector | None, radius_deg: float = 0.0) -> bool:
-            if direction is None:
-                return False
-            away_deg = float(np.degrees(np.arccos(np.clip(boresight @ direction, -1, 1))))
-            return away_deg - radius_deg < DISTURBING[name]
+        Other values of such a hazard stay, for instance the lens's ``scatter``. Without any, it is
+        there while its body is near ``boresight``.
+        """
+        others, own = [], {}
+        for one in hazards:
+            if one.name in self._places:
+                own[one.name] = one
+            else:
+                others.append(one)
+        for name, values in self._places.items():
+            usual = SKY_HAZARDS[name](**values)
+            kept = replace(own[name], **values) if name in own else usual
+            if kept != usual or self._near(name, boresight):
+                others.append(kept)
+        return tuple(others)
 
-        sun = _triple(self.sun)
+    @cached_property
+    def _places(self) -> dict[str, dict[str, Any]]:
+        """Where the hazard of each known body is."""
+        sun = None if self.sun is None else tuple(self.sun.tolist())
         found: dict[str, dict[str, Any]] = {}
-        if near("earth-limb", self.nadir, angular_radius_deg(self.altitude_km)):
-            stands = {"nadir": _triple(self.nadir), "sun": sun}
+        if self.nadir is not None:
+            stands = {"nadir": tuple(self.nadir.tolist()), "sun": sun}
             found["earth-limb"] = {**stands, "altitude_km": self.altitude_km}
-        if near("moon", self.moon):
-            found["moon"] = {"direction": _triple(self.moon), "sun": sun}
-        if self.shadow < 1 and near("sun-glare", self.sun):
+        if self.moon is not None:
+            found["moon"] = {"direction": tuple(self.moon.tolist()), "sun": sun}
+        if sun is not None and self.shadow < 1:
             found["sun-glare"] = {"direction": sun}
-        return tuple(SKY_HAZARDS[name](**values) for name, values in found.items())
+        return found
 
-
-def _triple(vector: Vector | None) -> tuple[float, ...] | None:
-    return None if vector is None else tuple(vector.tolist())
+    def _near(self, name: str, boresight: Vector) -> bool:
+        direction = {"earth-limb": self.nadir, "moon": self.moon, "sun-glare": self.sun}[name]
+        assert direction is not None
+        away_deg = float(np.degrees(np.arccos(np.clip(boresight @ direction, -1, 1))))
+        radius_deg = angular_radius_deg(self.altitude_km) if name == "earth-limb" else 0.0
+        return away_deg - radius_deg < DISTURBING[name]
 
 
 def hidden_share(radius: float, other: float, apart: float) -> float:
