@@ -28,7 +28,7 @@ from cubestack.sampling import AttitudeSampler, DirectionSampler, Sample
 
 Vector = NDArray[np.float64]
 
-STEP_S, SLOW_S = 2.0, 4.0  # between measurements of the star tracker, and of Sun and Earth
+STEP_S = 2.0  # between measurements of the star tracker
 PART_S = 0.1  # of the integration
 INERTIA = np.diag([0.035, 0.035, 0.007])  # kg m2
 TORQUE_N_M = 5e-4  # largest of the wheels
@@ -42,6 +42,7 @@ SUN = WANTED.T @ np.array([0.3, 0.8, -0.52])
 ORBIT_DEG_S, ALTITUDE_KM = 0.0634, 500.0
 
 BOTH = ("star-tracker", "sun-earth")
+SLOW_S = {("sun-earth",): 4.0, BOTH: 8.0}  # between measurements of Sun and Earth
 LATCH_UP, MOON_S = ["latch-up", "imager", "at_s=60.2"], (120.0, 140.0)
 DUSTY = Moon(scatter=0.2)  # a clean lens with 0.01 keeps its fixes
 
@@ -153,7 +154,7 @@ def loop(
             if "star-tracker" in sensors:
                 camera = quaternion_from_matrix(TRACKER @ attitude)
                 seen = tracker.step(time_s, camera, TRACKER @ rate, **moon)
-            if "sun-earth" in sensors and time_s % SLOW_S == 0:
+            if "sun-earth" in sensors and time_s % SLOW_S[sensors] == 0:
                 bodies = {"sun": SUN, "nadir": nadir_at(time_s), "altitude_km": ALTITUDE_KM}
                 found = [one.step(time_s, body, rate, **bodies) for one in cameras]
             use(estimate, seen, found)

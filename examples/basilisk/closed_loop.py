@@ -104,8 +104,9 @@ class Scenario:
     def __init__(self, stack: ExitStack, sensors: tuple[str, ...], faults: bool, seed: int) -> None:
         self._sim = SimulationBaseClass.SimBaseClass()
         process = self._sim.CreateNewProcess("satellite")
+        slow_s = plain.SLOW_S.get(sensors, plain.STEP_S)
         # At the same time the body moves first, then the sensors measure, then the loop acts.
-        tasks = (("body", plain.PART_S, 3), ("slow", plain.SLOW_S, 2), ("loop", plain.STEP_S, 1))
+        tasks = (("body", plain.PART_S, 3), ("slow", slow_s, 2), ("loop", plain.STEP_S, 1))
         for name, step_s, priority in tasks:
             process.addTask(self._sim.CreateNewTask(name, macros.sec2nano(step_s)), priority)
 

@@ -11,6 +11,7 @@ import pytest
 
 from cubestack.emulator.native.compiler import find_compiler
 from cubestack.emulator.scene.attitude import matrix_from_quaternion, random_quaternion
+from cubestack.host.errors import install_command
 
 ROOT = Path(__file__).parents[3]
 
@@ -30,7 +31,8 @@ def test_missing_basilisk_is_one_line() -> None:
     code = "import sys; sys.modules['Basilisk'] = None; import cubestack.basilisk"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     error = done.stderr.splitlines()[-1]
-    assert error == "ImportError: cubestack.basilisk needs Basilisk: pip install bsk"
+    command = install_command("basilisk")
+    assert error == f"ImportError: cubestack.basilisk needs Basilisk: {command}".rstrip()
 
 
 def test_attitudes_equal_those_of_basilisk(closed_loop: Any) -> None:
