@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -112,7 +113,7 @@ class Rig:
         """
         scenario = setup.scenario
         self.scenario = scenario
-        options = dict(scenario.options or {}) | {"firmware": setup.image}
+        options: dict[str, Any] = {**(scenario.options or {}), "firmware": setup.image}
         emulated = open_device(scenario.device, seed=scenario.seed, **options)
         self.emulated, self.board, self.kernel = emulated, emulated.board, emulated.board.kernel
         if not isinstance(self.board.processor, FirmwareProcessor):

@@ -344,7 +344,7 @@ class Tester:
             kind=case.kind,
             operation=case.cut.operation,
             address=-1 if hit is None else hit.address,
-            erases=hit is not None and hit.erased,
+            erases=hit is not None and bool(hit.erased),
             where="" if hit is None else self._fresh.symbols.describe(hit.pc),
             time_s=case.time_ps / PS_PER_S,
             share=cut.share,
