@@ -126,6 +126,17 @@ def test_tickless_kernel_sleeps_until_each_task_is_due(start: Start, name: str, 
     assert bench.sent[0].time_ps / MS == pytest.approx(1400 + 8 * 2531 / 32.768, abs=60)
 
 
+def test_timer_starts_the_adc_through_the_prs(start: Start) -> None:
+    bench = start("sampling")
+    bench.machine.analog[0], bench.machine.analog[9] = 1.1, 3.3
+    bench.machine.analog_changed()
+    bench.run_until(60 * MS)
+    _, value = bench.text.split()
+    assert int(value, 16) == pytest.approx(4096 * 1.1 / 3.3, abs=2)
+    first = next(one.time_ps for one in bench.sent[6:])
+    assert (first - bench.sent[5].time_ps) / MS == pytest.approx(16, abs=0.3)
+
+
 def test_watchdog_resets_repeatedly(start: Start) -> None:
     bench = start("watchdog")
     bench.run_until(450 * MS)

@@ -71,6 +71,19 @@ typedef struct {
 } MSC_TypeDef;
 
 typedef struct {
+    __IO uint32_t CTRL, CMD, STATUS, SINGLECTRL, SCANCTRL, IEN, IF, IFS, IFC, SINGLEDATA, SCANDATA,
+        SINGLEDATAP, SCANDATAP, CAL, RESERVED0, BIASPROG;
+} ADC_TypeDef;
+
+typedef struct {
+    __IO uint32_t CTRL, CMD, STATUS, IEN, IF, IFS, IFC, TOP, TOPB, CNT, ROUTE;
+} TIMER_TypeDef;
+
+typedef struct {
+    __IO uint32_t SWPULSE, SWLEVEL, ROUTE, RESERVED0, CH_CTRL[12];
+} PRS_TypeDef;
+
+typedef struct {
     __IO uint32_t CTRL, CMD, SYNCBUSY;
 } WDOG_TypeDef;
 
@@ -93,6 +106,9 @@ typedef struct {
 #define UART0 ((USART_TypeDef *)0x4000E000UL)
 #define I2C0 ((I2C_TypeDef *)0x4000A000UL)
 #define DMA ((DMA_TypeDef *)0x400C2000UL)
+#define ADC0 ((ADC_TypeDef *)0x40002000UL)
+#define TIMER0 ((TIMER_TypeDef *)0x40010000UL)
+#define PRS ((PRS_TypeDef *)0x400CC000UL)
 #define RTC ((RTC_TypeDef *)0x40080000UL)
 #define BURTC ((BURTC_TypeDef *)0x40081000UL)
 #define LETIMER0 ((LETIMER_TypeDef *)0x40082000UL)
@@ -103,7 +119,8 @@ typedef struct {
 #define SCB ((SCB_Type *)0xE000ED00UL)
 #define NVIC_ISER ((__IO uint32_t *)0xE000E100UL)
 enum {
-    DMA_IRQn = 0, I2C0_IRQn = 9, UART0_RX_IRQn = 20, LETIMER0_IRQn = 26, RTC_IRQn = 30, BURTC_IRQn = 31
+    DMA_IRQn = 0, ADC0_IRQn = 7, I2C0_IRQn = 9, UART0_RX_IRQn = 20, LETIMER0_IRQn = 26, RTC_IRQn = 30,
+    BURTC_IRQn = 31
 };
 
 static inline void NVIC_EnableIRQ(int irq) { NVIC_ISER[irq >> 5] = 1UL << (irq & 31); }
@@ -122,6 +139,9 @@ static inline void __disable_irq(void) { __asm volatile("cpsid i" ::: "memory");
 #define CMU_HFCORECLKEN0_DMA (1UL << 0)
 #define CMU_HFCORECLKEN0_LE (1UL << 4)
 #define CMU_HFPERCLKEN0_UART0 (1UL << 3)
+#define CMU_HFPERCLKEN0_TIMER0 (1UL << 5)
+#define CMU_HFPERCLKEN0_PRS (1UL << 15)
+#define CMU_HFPERCLKEN0_ADC0 (1UL << 16)
 #define CMU_HFPERCLKEN0_I2C0 (1UL << 11)
 #define CMU_HFPERCLKEN0_GPIO (1UL << 13)
 #define CMU_LFACLKEN0_RTC (1UL << 1)
