@@ -156,7 +156,6 @@ class Wiring:
             component=component,
             storing=storing or (lambda _level: cameras),
             stored=lambda _level: (),
-            burst_levels=(),
             foreign=True,
         )
 

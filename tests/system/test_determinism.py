@@ -10,6 +10,7 @@ from cubestack.emulator.camera.mlx75412.lens import CONDITION
 from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
 from cubestack.emulator.scene.earth_sun import EarthSunScene
 from cubestack.emulator.scene.sky import SkyScene
+from cubestack.hdl.cubesense.tops import TOPS as PAIR_TOPS
 from cubestack.hdl.cubestar.tops import TOPS
 from cubestack.hdl.flow.tools import have_yosys, run_yosys
 from cubestack.hdl.flow.top import tops_in
@@ -88,6 +89,62 @@ def test_exported_verilog_does_not_change_the_run(file: str, seed: int, exported
         one["recording"] = str(one["recording"]).splitlines()[1:]
         del one["registers"], one["faults"]
     assert given == shipped
+
+
+def pair_life(seed: int, gateware: str = "") -> dict[str, object]:
+    """Traffic and final state of a CubeSense with random poses, memories and faults."""
+    rng = np.random.default_rng(seed)
+    scene = EarthSunScene.facing(
+        sun_deg=tuple(rng.uniform(-20, 20, 2)), nadir_deg=tuple(rng.uniform(-15, 15, 2))
+    )
+    design = {"gateware": gateware} if gateware else {}
+    view = EarthSunView(scene, FisheyeCondition(hot_pixels=20, seed=seed))
+    with open_device("cubesense", view, seed=seed, engine="compiled", **design) as opened:
+        recording = StringIO()
+        recorder = start_recorder(opened, recording)
+        kinds = [kind for kind, fault in FAULTS.items() if opened.faults.targets(fault.site)]
+        kinds = [kind for kind in kinds if not kind.startswith("register-")]
+        opened.faults.seed = seed
+        for kind in rng.choice(kinds, FAULTS_AT_ONCE):
+            targets = opened.faults.targets(FAULTS[kind].site)
+            target = targets[int(rng.integers(len(targets)))]
+            opened.faults.inject(str(kind), target=target, at_s=float(rng.uniform(0, LATEST_S)))
+        client = opened.client.client
+        for camera, sram in zip((0, 1, 0, 1), rng.integers(0, 2, 4).tolist(), strict=True):
+            try:
+                client.command("CaptureAndDetect", Camera=camera, Sram=sram)
+            except HostError:
+                client.pause(0.05)
+            client.pause(0.4)
+        recorder.close()
+        board = opened.board
+        return {
+            # without the header, which names the gateware
+            "recording": recording.getvalue().splitlines()[1:],
+            "memories": [memory.tobytes() for memory in board.sites().all_memories().values()],
+            "violations": (board.engine.violations, dict(board.engine.violation_counts)),
+            "now": board.kernel.now,
+        }
+
+
+@pytest.fixture(scope="module")
+def exported_pair(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """Both shipped FPGAs of CubeSense, as another tool rewrites them."""
+    folder, tops = tmp_path_factory.mktemp("pair"), tops_in(PAIR_TOPS)
+    for side in ("sun", "nadir"):
+        text = verilog_file(side, tops[f"cubesense-{side}-as-flown"])
+        (folder / f"{side}.v").write_text(text)
+        script = f"read_verilog {side}.v\nhierarchy -auto-top\nproc\nflatten\ntribuf\nopt -full\n"
+        run_yosys(f"{script}write_verilog -noattr {side}_rewritten.v\n", folder)
+    return ",".join(f"{side}={folder / side}_rewritten.v" for side in ("sun", "nadir"))
+
+
+@pytest.mark.skipif(not have_yosys(), reason="no whole Yosys")
+@pytest.mark.parametrize("seed", quick(range(50), 1))
+def test_rewritten_verilog_of_the_pair_does_not_change_the_run(
+    seed: int, exported_pair: str
+) -> None:
+    assert pair_life(seed, exported_pair) == pair_life(seed)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from cubestack.emulator.native import cache
 from cubestack.emulator.native.compiler import Compiler, compile_library
 from cubestack.emulator.rtl.cxxrtl.edges import edges_after_commit
 from cubestack.emulator.rtl.cxxrtl.pins_header import pins_header
-from cubestack.emulator.rtl.cxxrtl.variants import variant_text
+from cubestack.emulator.rtl.cxxrtl.variants import has_state_of, variant_text
 from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.hdl.flow.generate import (
     cxxrtl_headers,
@@ -69,7 +69,12 @@ def _compile(wiring: Wiring, compiler: Compiler, scratch: Path, log: Path) -> Pa
     design = edges_after_commit(cxxrtl_text(wiring.component))
     (scratch / "design.cpp").write_text(design)
     rtlil = rtlil_text(wiring.component)
-    variants = [variant_text(rtlil, levels) for levels in wiring.burst_levels]
+    variants = [
+        edges_after_commit(variant_text(rtlil, levels, foreign=wiring.foreign))
+        for levels in wiring.burst_levels
+    ]
+    if not all(has_state_of(design, variant) for variant in variants):
+        variants = []
     for number, variant in enumerate(variants):
         (scratch / f"variant_{number}.cpp").write_text(variant)
     (scratch / "pins.h").write_text(pins_header(wiring, design, variants))

@@ -81,7 +81,8 @@ def _evaluation(variant: str, members: dict[str, str]) -> _Evaluation | None:
     """Parse eval(); None for an unknown statement."""
     found = _Evaluation()
     body = variant[variant.index("bool p_top::eval(") :]
-    lines = iter(body[body.index("\n") + 1 : body.index("\n}\n")].splitlines())
+    body = body[body.index("\n") + 1 : body.index("\n}\n")]
+    lines = iter(body.splitlines())
     for line in lines:
         if _IGNORED.fullmatch(line):
             continue
@@ -97,6 +98,8 @@ def _evaluation(variant: str, members: dict[str, str]) -> _Evaluation | None:
             found.resets.setdefault(match[1], set()).update(_NEXT.findall(block))
         else:
             return None
+    if body.count(".next") != len(_NEXT.findall(body)):
+        return None  # a part of a register
     done: set[str] = set()
     for name, expression in found.assignments:
         later = {*_NAME.findall(expression)} & {*found.types} - done
@@ -126,7 +129,7 @@ def _steps(
     outputs = {port(name) for name in wiring.output_pins}
     after_fall = _dependents(evaluation, pins)
     after_rise = _dependents(evaluation, {*pins, *registers})
-    clocks = {*evaluation.at_edge} - {clock}
+    clocks = {_whole(name, evaluation, members) for name in evaluation.at_edge} - {clock}
     other_resets = [
         condition for condition, reset in evaluation.resets.items() if not reset <= {*registers}
     ]
@@ -134,7 +137,7 @@ def _steps(
     if wiring.contention is not None:
         foreign.add(port(wiring.contention))
     offered = _dependents(evaluation, {port(memory["D_I"]) for memory in wiring.memories})
-    if foreign & after_rise or outputs & offered:
+    if "" in clocks or foreign & (after_rise | offered) or outputs & offered:
         return None
 
     now = f"prev_{clock} = {clock};\n" if blocks else ""
@@ -155,6 +158,12 @@ def _steps(
         now + _assignments(evaluation, after_fall & outputs),
         [any(port(memory[pin]) in after_rise for pin in MEMORY_PINS) for memory in wiring.memories],
     )
+
+
+def _whole(clock: str, evaluation: _Evaluation, members: dict[str, str]) -> str:
+    """Name of the net of a clock that may be one bit of it, as in ``p_net_0``; empty if unknown."""
+    known = {*evaluation.types, *members}
+    return next((n for n in (clock, re.sub(r"_\d+$", "", clock)) if n in known), "")
 
 
 def _dependents(evaluation: _Evaluation, names: set[str]) -> set[str]:

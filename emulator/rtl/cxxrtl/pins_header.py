@@ -24,7 +24,7 @@ def pins_header(wiring: Wiring, design: str, variants: Sequence[str] = ()) -> st
     - FOREIGN: whether it is a user's design, of which nothing is known.
     - REGISTERS: REGISTER(name, port, bits) of every register.
     - derived_edge(top): whether a clock that is not a pin has an edge that takes effect;
-      forget_derived_edges(top) clears these edges.
+      forget_derived_edges(top) clears these edges, and forget_edges(top) those of the pins too.
     - VARIANTS: VARIANT(number) of each. suits_0(top): whether the pins of the design have the
       variant's levels; same_0(a, b): whether outputs agree; copy_0(from, to) copies all state that
       can change; hold_0(from, to) copies the rest. The variant's class is from clock_steps.py.
@@ -57,8 +57,8 @@ def pins_header(wiring: Wiring, design: str, variants: Sequence[str] = ()) -> st
     return text
 
 
-def _level(name: str) -> str:
-    return f"top.{port(name)}.template get<uint32_t>()"
+def _level(name: str, model: str = "top") -> str:
+    return f"{model}.{port(name)}.template get<uint32_t>()"
 
 
 def _pin(wiring: Wiring, name: str) -> str:
@@ -108,11 +108,15 @@ def _derived_edges(wiring: Wiring, design: str, namespace: str) -> str:
     edges = [f"top.{detector}()" for detector, clock in detectors if clock not in pins]
     levels = re.findall(r"prev_(\w+) = (\1(?:\.curr)?);", design)
     clocks = [(clock, level) for clock, level in levels if clock not in pins]
-    forget = " ".join(f"top.prev_{clock} = top.{level};" for clock, level in clocks)
+    forget, forget_all = (
+        " ".join(f"top.prev_{clock} = top.{level};" for clock, level in some)
+        for some in (clocks, levels)
+    )
     return (
         f"inline bool derived_edge(const {namespace}::p_top &top) "
         f"{{ (void)top; return {' || '.join(edges) or 'false'}; }}\n"
         f"inline void forget_derived_edges({namespace}::p_top &top) {{ (void)top; {forget} }}\n"
+        f"inline void forget_edges({namespace}::p_top &top) {{ (void)top; {forget_all} }}\n"
     )
 
 
@@ -131,7 +135,7 @@ def _variant(wiring: Wiring, design: str, variant: str, number: int) -> str:
         if whole.get(name, "").startswith("wire")
     )
     suits = " && ".join(f"{_level(pin)} == {level}u" for pin, level in wiring.burst_levels[number])
-    same = " && ".join(f"a.{port(pin)} == b.{port(pin)}" for pin in wiring.output_pins)
+    same = " && ".join(f"{_level(pin, 'a')} == {_level(pin, 'b')}" for pin in wiring.output_pins)
     return (
         f"#define cxxrtl_design {namespace}\n"
         f"#define cxxrtl_design_create {namespace}_create\n"

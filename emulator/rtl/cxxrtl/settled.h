@@ -155,8 +155,8 @@ protected:
         const bool changed = top.rise(camera);
         if (top.in_reset(camera))
             return settle_in_reset(top, time) | changed;
-        follow<N>(top, time);
-        return changed;
+        const bool moved = follow<N>(top, time);
+        return changed || (FOREIGN && moved);
     }
 
     template <int N, class Model> bool settle_fall(Model &top, int64_t time) {
@@ -164,8 +164,7 @@ protected:
         if (top.in_reset(camera))
             return settle_in_reset(top, time);
         top.fall(camera);
-        follow<N>(top, time);
-        return false;
+        return follow<N>(top, time) && FOREIGN;
     }
 
     template <class Model>
@@ -173,19 +172,23 @@ protected:
         return settle(top, time);
     }
 
-    // Updates the memories whose pins the clock of a camera can change.
-    template <int N, class Model> void follow(Model &top, int64_t time) {
-        follow<N>(top, time, std::make_integer_sequence<int, MEMORY_COUNT>());
+    // Updates the memories whose pins the clock of a camera can change; returns whether any did.
+    template <int N, class Model> bool follow(Model &top, int64_t time) {
+        return follow<N>(top, time, std::make_integer_sequence<int, MEMORY_COUNT>());
     }
     template <int N, class Model, int... M>
-    void follow(Model &top, int64_t time, std::integer_sequence<int, M...>) {
-        (follow_one<N, M>(top, time), ...);
+    bool follow(Model &top, int64_t time, std::integer_sequence<int, M...>) {
+        bool moved = false;
+        ((moved |= follow_one<N, M>(top, time)), ...);
+        return moved;
     }
-    template <int N, int M, class Model> void follow_one(Model &top, int64_t time) {
+    template <int N, int M, class Model> bool follow_one(Model &top, int64_t time) {
+        bool moved = false;
         if constexpr (Model::may_move(std::integral_constant<int, N>(), M)) {
-            srams[M].drive(time, Memory<M>::pins(top));
+            moved = srams[M].drive(time, Memory<M>::pins(top));
             Memory<M>::offer(top, srams[M].bus());
         }
+        return moved;
     }
 
 private:

@@ -6,6 +6,9 @@ registers of some eighty, and resolves the link's clock to a pin.
 Every register that can still change stays, even if no output depends on it, because its state is
 copied back to the whole design after the burst. A register without reset whose clock is fixed holds
 its value, so it is an input of the variant. The registers that Yosys removes are in reset.
+
+Of a user's design only registers in asynchronous reset are removed, here. Yosys would also remove
+one that keeps its initial value from the start, which it need not have when the burst begins.
 """
 
 import re
@@ -38,19 +41,39 @@ opt_clean
 write_cxxrtl -g0
 """
 
+_TRANSLATE_FOREIGN = """
+opt_expr
+opt_clean
+write_cxxrtl -g0
+"""
+
 _MEMBER = re.compile(r"^\t(?:/\*(?:in|out)put\*/ )?((?:wire|value)<\d+>) (\w+);", re.MULTILINE)
 _INPUT = re.compile(r"^\t/\*input\*/ value<\d+> (\w+);", re.MULTILINE)
 _CONSTANT = re.compile(r"^\t(p_\w+) = value<\d+>\{[0-9a-fxu, ]+\};\n", re.MULTILINE)
 _CELL = re.compile(
-    r"^(?:  attribute .*\n)*  cell (\$a?dff) .*\n((?:    .*\n)*)  end\n", re.MULTILINE
+    r"^(?:  attribute .*\n)*  cell (\$a?dffe?) .*\n((?:    .*\n)*)  end\n", re.MULTILINE
 )
+_RESET_VALUE = re.compile(r"parameter \\ARST_VALUE (\S+)\n")
+_ARST = re.compile(r"^    (?:parameter|connect) \\ARST\w* .*\n", re.MULTILINE)
+_COPY = re.compile(
+    r"^(?:  attribute .*\n)*(  cell \$pos .*\n(?:    .*\n)*?"
+    r"    connect \\Y (\S+)\n(?:    .*\n)*  end\n)",
+    re.MULTILINE,
+)
+_PORT = re.compile(r"^  wire .*?put \d+ (\S+)\n", re.MULTILINE)
+_Q = re.compile(r"^    connect \\Q (.*)\n", re.MULTILINE)
+_WIRE = re.compile(r"^  wire .*?([\\$]\S+)\n", re.MULTILINE)
 _FIXED_CLOCK = re.compile(r"connect \\CLK 1'[01]\n")
-_RESET = re.compile(r"parameter \\ARST_POLARITY ([01])\n(?:.*\n)*?    connect \\ARST 1'([01])\n")
+_RESET = re.compile(
+    r"parameter \\ARST_POLARITY (?:\d+')?0*([01])\n(?:.*\n)*?    connect \\ARST 1'([01])\n"
+)
 _OUTPUT = re.compile(r"connect \\Q (\\\S+)\n")
 
 
-def variant_text(rtlil: str, levels: Iterable[tuple[str, int]]) -> str:
+def variant_text(rtlil: str, levels: Iterable[tuple[str, int]], *, foreign: bool = False) -> str:
     """CXXRTL's C++ of module top of ``rtlil`` with its one-bit inputs ``levels`` fixed.
+
+    ``foreign`` as in ``Wiring``.
 
     Raises:
         ValueError: the design has no such input.
@@ -63,6 +86,9 @@ def variant_text(rtlil: str, levels: Iterable[tuple[str, int]]) -> str:
             raise ValueError(f"the design has no one-bit input {name}")
         design = port.sub(f"wire \\\\{name}\n", design)
         design = design.replace("\nend\n", f"\n  connect \\{name} 1'{level}\nend\n")
+    if foreign:
+        kept = _hold(_without_resets(_yosys(_keep_registers(design), _FIX)))
+        return _constants_once(_yosys(kept, _TRANSLATE_FOREIGN))
     design = _hold(_yosys(design, _FIX))
     # Only registers have an initial value.
     kept = design.replace("  attribute \\init ", "  attribute \\keep 1\n  attribute \\init ")
@@ -72,6 +98,16 @@ def variant_text(rtlil: str, levels: Iterable[tuple[str, int]]) -> str:
 def members(design: str) -> Mapping[str, str]:
     """Names and types of the state and the pins of CXXRTL's class."""
     return {name: kind for kind, name in _MEMBER.findall(_class(design))}
+
+
+def has_state_of(design: str, variant: str) -> bool:
+    """Whether each register of the variant is one of the design, so that bursts can copy it.
+
+    A variant without it is of no use; the state of memories is never copied.
+    """
+    whole, part = members(design), members(variant)
+    registers = {name: kind for name, kind in part.items() if kind.startswith("wire")}
+    return "memory<" not in design and registers.items() <= whole.items()
 
 
 def input_names(design: str) -> list[str]:
@@ -100,12 +136,43 @@ def _yosys(rtlil: str, script: str) -> str:
     return done.stdout
 
 
+def _keep_registers(design: str) -> str:
+    """Keep registers, but not the copies of the ports of an FPGA within a pair (nets.py)."""
+    ports = {*_PORT.findall(design)}
+    design = _COPY.sub(lambda copy: copy[0] if copy[2] in ports else copy[1], design)
+    outputs = {name for sides in _Q.findall(design) for name in re.findall(r"[\\$]\S+", sides)}
+    return _WIRE.sub(
+        lambda wire: f"  attribute \\keep 1\n{wire[0]}" if wire[1] in outputs else wire[0], design
+    )
+
+
+def _without_resets(design: str) -> str:
+    """Replace registers in asynchronous reset by their levels; drop resets that are never active.
+
+    Of resets that are fixed.
+    """
+    while True:
+        found = _CELL.sub(_without_reset, design)
+        if found == design:
+            return design
+        design = _yosys(found, _FIX)
+
+
+def _without_reset(cell: re.Match[str]) -> str:
+    reset, value, output = (part.search(cell[2]) for part in (_RESET, _RESET_VALUE, _Q))
+    if reset is None or value is None or output is None:
+        return cell[0]
+    if reset[1] == reset[2]:
+        return f"  connect {output[1]} {value[1]}\n"
+    return _ARST.sub("", cell[0]).replace(cell[1], cell[1].replace("$adff", "$dff"), 1)
+
+
 def _hold(design: str) -> str:
     number = 1000  # port number, above those of all other ports
     for cell in list(_CELL.finditer(design)):
         kind, body = cell.groups()
         reset, output = _RESET.search(body), _OUTPUT.search(body)
-        without = kind == "$dff" or (reset is not None and reset[1] != reset[2])
+        without = kind in ("$dff", "$dffe") or (reset is not None and reset[1] != reset[2])
         if output is None or not without or not _FIXED_CLOCK.search(body):
             continue
         wire = re.compile(rf"(?:  attribute .*\n)*  wire ((?:width \d+ )?){re.escape(output[1])}\n")
