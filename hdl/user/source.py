@@ -82,6 +82,20 @@ def parse_source(text: str, folder: Path | None = None) -> Source | ClassName:
     return Source(Path(names).name or names, files, top, includes, tuple(found.defines))
 
 
+def rebased(text: str, folder: Path) -> str:
+    """``text`` with the paths that exist below ``folder`` starting there.
+
+    ``text`` as above, or "sun=DESIGN,nadir=DESIGN"; a class stays as it is.
+    """
+    parts = []
+    for part in text.split(","):
+        before, equals, name = part.rpartition("=")
+        top = _TOP.fullmatch(name)
+        exists = (folder / name).exists() or (top and (folder / top[1]).exists())
+        parts.append(f"{before}{equals}{folder / name if name and exists else name}")
+    return ",".join(parts)
+
+
 def _add(found: _Found, path: Path, name: str) -> None:
     if not path.exists():
         raise GatewareError(f"gateware {name} does not exist")

@@ -9,6 +9,7 @@ import pytest
 
 from cubestack.emulator.native.compiler import find_compiler
 from cubestack.firmware_model.interface.codec.switches import DEFAULT_PROFILE
+from cubestack.hdl.flow.tools import have_yosys
 from cubestack.host.devices.registry import emulated_names
 from cubestack.host.pytest_plugin import KEYS
 
@@ -84,6 +85,19 @@ WRONG_MARKERS = {
     "(profile='best')": "profile of aramis must be one of published, extended, not 'best'",
     "(faults='none.toml')": "none.toml: No such file or directory",
 }
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not have_yosys(), reason="no whole Yosys")
+def test_fixture_runs_own_gateware(run: Run) -> None:
+    file = Path(__file__).parents[2] / "examples/own_gateware/frame_buffer.v"
+    done = run(
+        f"@pytest.mark.cubestack(gateware={str(file)!r}, gateware_param='COLUMNS=1024')\n"
+        "def test_it(cubestar):\n"
+        "    assert cubestar.board.engine.wiring.foreign\n"
+        "    assert cubestar.client.capture_and_process().name == 'CALCULATED'\n"
+    )
+    assert done.returncode == 0, done.stdout
 
 
 def test_rejects_invalid_markers(run: Run) -> None:

@@ -19,6 +19,7 @@ from typing import Any, Self
 import numpy as np
 
 from cubestack.firmware_model.values import REQUIRED, whole
+from cubestack.hdl.user.source import rebased
 from cubestack.host.devices.registry import device as registered
 from cubestack.host.devices.registry import devices
 from cubestack.host.experiments.measure import MEASURE, board_options, experiment_of, measure
@@ -173,6 +174,8 @@ def _with_paths(table: dict[str, Any], folder: Path) -> dict[str, Any]:
     }
 
     def told(name: str, value: Any) -> Any:
+        if name == "gateware" and isinstance(value, str):
+            return rebased(value, folder)
         return str(folder / value) if name in files and isinstance(value, str) else value
 
     changed = dict(table)

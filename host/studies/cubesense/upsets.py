@@ -9,6 +9,7 @@ the firmware's answer with the truth.
 examples:
   cubestack upsets cubesense
   cubestack upsets cubesense --registers 'sun.*' --json
+  cubestack upsets cubesense --gateware sun=sun.v,nadir=nadir.v
   cubestack campaign seu-cubesense           the whole atlas, resumable, on all cores
 """
 
@@ -19,20 +20,20 @@ from typing import Any
 import numpy as np
 
 from cubestack.emulator.boards.cubesense.board import CubeSenseBoard, wiring_of
+from cubestack.emulator.boards.cubesense.wiring import with_designs
 from cubestack.emulator.rtl.contract import RtlEngine
 from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.firmware_model.interface.cubesense.codes import Camera, Sram
 from cubestack.firmware_model.interface.cubesense.fpga import Action, actions
 from cubestack.firmware_model.interface.cubesense.pins import CONTROLS
-from cubestack.firmware_model.interface.cubesense.switches import (
-    DEFAULT_SWITCHES,
-    CubeSenseSwitches,
-)
-from cubestack.firmware_model.values import choice
+from cubestack.firmware_model.interface.cubesense.switches import DEFAULT_SWITCHES
+from cubestack.firmware_model.values import text
 from cubestack.host.clients.cubesense.client import CubeSense
 from cubestack.host.emulation.emulated import EmulatedDevice
 from cubestack.host.experiments.cubesense.measure import CubeSenseOptions, is_right, random_view
-from cubestack.host.studies.upsets.experiment import UpsetExperiment, UpsetOptions
+from cubestack.host.sensors.cubesense import VARIANTS
+from cubestack.host.studies.upsets.experiment import UpsetExperiment
+from cubestack.host.studies.upsets.gateware import DECIDED, GatewareUpsetOptions
 from cubestack.host.studies.upsets.subject import BETWEEN, IDLE, STORING, Rig, Subject, UpsetVerdict
 
 LINKED, READING = "linked", "reading"
@@ -73,33 +74,37 @@ def _state(engine: RtlEngine) -> str:
 
 
 @dataclass(frozen=True, kw_only=True)
-class CubeSenseUpsetOptions(UpsetOptions):
+class CubeSenseUpsetOptions(GatewareUpsetOptions):
     """Options of `cubestack upsets cubesense`."""
 
-    gateware: str = choice(
+    gateware: str = text(
         DEFAULT_SWITCHES.gateware,
-        "of both FPGAs (default as-flown)",
-        CubeSenseSwitches.declared()["gateware"].choices,
+        f"shipped variant of both FPGAs ({', '.join(VARIANTS)}; default as-flown), or your own "
+        "design of the pair, or of one FPGA: sun=..., nadir=... (docs/how-to/own-gateware.md)",
+        metavar="VARIANT|FILE[:TOP]|MODULE:CLASS",
     )
 
 
-def _wiring(gateware: str) -> Wiring:
-    return wiring_of(gateware)
+@cache
+def _wiring(gateware: str, gateware_param: str) -> Wiring:
+    if gateware in VARIANTS:
+        return with_designs(wiring_of(gateware), "", gateware_param)
+    return with_designs(wiring_of(DEFAULT_SWITCHES.gateware), gateware, gateware_param)
 
 
 @cache
-def _rig_of(gateware: str) -> Rig:
+def _rig_of(gateware: str, gateware_param: str) -> Rig:
     subjects = tuple(
         Subject(_scene, partial(_start, sram), _judge, _state, row_bytes=640) for sram in Sram
     )
     phases = (IDLE, STORING, BETWEEN, LINKED, READING)
-    board = {"set": f"gateware={gateware}"}
-    return Rig(subjects, partial(_wiring, gateware), phases, ("sun", "nadir"), board)
+    design = {"gateware": gateware, "gateware_param": gateware_param}
+    return Rig(subjects, partial(_wiring, **design), phases, ("sun", "nadir"), design)
 
 
 EXPERIMENT = UpsetExperiment(
-    lambda options: _rig_of(options.gateware),
+    lambda options: _rig_of(options.gateware, options.gateware_param),
     __doc__,
-    decides=("profile", "set", "gateware", "gateware_param", "mcu_addressing", "uart"),
+    decides=("profile", "set", *DECIDED, "mcu_addressing", "uart"),
     options=CubeSenseUpsetOptions,
 )

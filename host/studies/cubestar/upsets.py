@@ -24,12 +24,13 @@ from cubestack.emulator.camera.mlx75412.lens import CONDITION
 from cubestack.emulator.rtl.contract import RtlEngine
 from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.firmware_model.interface.cubestar.pins import BOARD_PREFIXES, ENABLE, RNW, Layout
-from cubestack.firmware_model.values import choice, text
+from cubestack.firmware_model.values import choice
 from cubestack.host.clients.cubestar.client import CubeStar
 from cubestack.host.emulation.emulated import EmulatedDevice
 from cubestack.host.experiments import attitude as attitudes
 from cubestack.host.experiments.cubestar.measure import wait_started
-from cubestack.host.studies.upsets.experiment import UpsetExperiment, UpsetOptions
+from cubestack.host.studies.upsets.experiment import UpsetExperiment
+from cubestack.host.studies.upsets.gateware import DECIDED, GatewareUpsetOptions
 from cubestack.host.studies.upsets.subject import BETWEEN, IDLE, STORING, Rig, Subject, UpsetVerdict
 
 READING = "reading"
@@ -79,7 +80,7 @@ def _state(engine: RtlEngine) -> str:
 
 
 @dataclass(frozen=True, kw_only=True)
-class CubeStarUpsetOptions(UpsetOptions):
+class CubeStarUpsetOptions(GatewareUpsetOptions):
     """Options of `cubestack upsets cubestar`."""
 
     layout: str = choice(
@@ -87,10 +88,6 @@ class CubeStarUpsetOptions(UpsetOptions):
         "memory layout, and the gateware for it (default 1, the published one)",
         tuple(layout.value for layout in Layout),
     )
-    gateware: str = text(
-        "", "your own FPGA design (docs/how-to/own-gateware.md)", metavar="FILE[:TOP]|MODULE:CLASS"
-    )
-    gateware_param: str = text("", "its parameters", metavar="NAME=VALUE,...")
 
 
 @cache
@@ -113,6 +110,6 @@ def _rig_of(layout: Layout, gateware: str, gateware_param: str) -> Rig:
 EXPERIMENT = UpsetExperiment(
     lambda options: _rig_of(Layout(options.layout), options.gateware, options.gateware_param),
     __doc__,
-    decides=("layout", "gateware", "gateware_param"),
+    decides=("layout", *DECIDED),
     options=CubeStarUpsetOptions,
 )

@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from cubestack.emulator.native.compiler import find_compiler
 from cubestack.firmware_model.reference.image import reference_image
 from cubestack.host.errors import PortOpenError, TargetError
 from cubestack.host.ground.emulators import Emulator, UploadedFile, words
@@ -14,6 +15,8 @@ from cubestack.host.ground.serving import Serving
 from cubestack.host.ground.session import TargetSession
 
 from .conftest import TOKEN, request, serving_pages
+
+OWN_GATEWARE = Path(__file__).parents[3] / "examples/own_gateware/frame_buffer.v"
 
 
 @pytest.fixture(scope="module")
@@ -59,6 +62,28 @@ def test_restart_changes_the_profile_and_keeps_scene_and_seed(
     assert (now["profile"], now["firmware"]) == ("extended", "")
     values = session.execute("read Identification").result()["data"]["values"]
     assert values["NodeType"] > 0
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
+def test_page_runs_and_changes_own_gateware() -> None:
+    emulator = Emulator("cubestar", {"gateware": str(OWN_GATEWARE)})
+    own = TargetSession(emulator.start(), emulator)
+    try:
+        with serving_pages(own) as served:
+            own.execute("write CaptureAndProcess").result()
+            values = own.execute("read Identification").result()["data"]["values"]
+            assert values["NodeType"] > 0
+            values = own.execute("read Identification").result()["data"]["values"]
+            assert values["NodeType"] > 0
+            now = {row["name"]: row["now"] for row in own.about["options"]}
+            assert now["gateware"] == str(OWN_GATEWARE)
+            assert restart(served, {"options": {"gateware": ""}})[0] == 200
+            status, told = restart(served, {"options": {"gateware": "none.v"}})
+            assert status != 200
+            assert "gateware none.v does not exist" in json.dumps(told)
+    finally:
+        own.close()
 
 
 def test_restart_runs_uploaded_firmware(session: TargetSession, served: Serving) -> None:

@@ -32,6 +32,21 @@ def write(path: Path, text: str = TEXT) -> Path:
     return path
 
 
+def test_paths_of_gateware_start_at_the_plan(tmp_path: Path) -> None:
+    for name in ("sun.v", "nadir.v"):
+        (tmp_path / name).touch()
+    designs = {
+        "sun=sun.v:top,nadir=nadir.v": f"sun={tmp_path}/sun.v:top,nadir={tmp_path}/nadir.v",
+        "sun.v,nadir.v:top": f"{tmp_path}/sun.v,{tmp_path}/nadir.v:top",
+        f"{tmp_path}/sun.v": f"{tmp_path}/sun.v",
+        "design:Class": "design:Class",
+        "corrected": "corrected",
+    }
+    grid = f'device = "cubesense"\nframes = 1\n[grid]\ngateware = {json.dumps([*designs])}\n'
+    plan = CampaignPlan.read(write(tmp_path / "a.toml", grid))
+    assert plan.grid["gateware"] == [*designs.values()]
+
+
 def test_campaign_has_a_point_for_every_combination(tmp_path: Path) -> None:
     plan = CampaignPlan.read(write(tmp_path / "a.toml"))
     assert len(plan.points) == 6

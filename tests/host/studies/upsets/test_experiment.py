@@ -1,5 +1,6 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -10,6 +11,10 @@ from cubestack.emulator.boards.cubestar import stack
 from cubestack.emulator.native.compiler import find_compiler
 from cubestack.hdl.blocks import frames
 from cubestack.hdl.blocks.counters import MatrixCounter
+from cubestack.hdl.cubesense.tops import TOPS as PAIR_TOPS
+from cubestack.hdl.flow.tools import have_yosys
+from cubestack.hdl.flow.top import tops_in
+from cubestack.hdl.flow.verilog import verilog_file
 from cubestack.host.devices.registry import device
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.studies.cubesense import upsets as cubesense
@@ -149,6 +154,24 @@ def test_upset_experiment_covers_two_linked_fpgas(gateware: str) -> None:
     assert {result.phase for result in results} == set(phases)
     assert {result.effect for result in results if result.phase == "idle"} == {"nothing"}
     assert {result.effect for result in results} > {"nothing"}
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not have_yosys(), reason="no whole Yosys")
+def test_upsets_of_own_gateware_of_the_pair_are_those_of_the_shipped_one(tmp_path: Path) -> None:
+    top = tops_in(PAIR_TOPS)["cubesense-sun-as-flown"]
+    (tmp_path / "sun.v").write_text(verilog_file("sun", top))
+    design = f"sun={tmp_path / 'sun.v'}"
+    shipped, own = (
+        measured(
+            *("cubesense", cubesense.EXPERIMENT),
+            **{"gateware": gateware, "registers": f"sun.{inside}pix_writer.ack", "memory_bits": 0},
+        )
+        for gateware, inside in (("as-flown", ""), (design, "design.core."))
+    )
+    renamed = [replace(one, target=one.target.replace("design.core.", "")) for one in own]
+    assert {one.target for one in renamed} == {"sun.pix_writer.ack"}
+    assert renamed == shipped
 
 
 @pytest.mark.parametrize(
