@@ -5,8 +5,10 @@ from io import StringIO
 
 import numpy as np
 
+from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
 from cubestack.emulator.faults.table import FAULTS
 from cubestack.emulator.scene.attitude import random_quaternion
+from cubestack.emulator.scene.earth_sun import EarthSunScene
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.host.emulation.emulated import open_device
 from cubestack.host.emulation.records import start_recorder
@@ -73,5 +75,41 @@ def life(
             "violations": (board.engine.violations, dict(board.engine.violation_counts)),
             "registers": board.engine.state(),
             "faults": [str(event) for event in opened.faults.log],
+            "now": board.kernel.now,
+        }
+
+
+def pair_life(seed: int, gateware: str = "") -> dict[str, object]:
+    """Traffic and final state of a CubeSense with random poses, memories and faults."""
+    rng = np.random.default_rng(seed)
+    scene = EarthSunScene.facing(
+        sun_deg=tuple(rng.uniform(-20, 20, 2)), nadir_deg=tuple(rng.uniform(-15, 15, 2))
+    )
+    design = {"gateware": gateware} if gateware else {}
+    view = EarthSunView(scene, FisheyeCondition(hot_pixels=20, seed=seed))
+    with open_device("cubesense", view, seed=seed, engine="compiled", **design) as opened:
+        recording = StringIO()
+        recorder = start_recorder(opened, recording)
+        kinds = [kind for kind, fault in FAULTS.items() if opened.faults.targets(fault.site)]
+        kinds = [kind for kind in kinds if not kind.startswith("register-")]
+        opened.faults.seed = seed
+        for kind in rng.choice(kinds, FAULTS_AT_ONCE):
+            targets = opened.faults.targets(FAULTS[kind].site)
+            target = targets[int(rng.integers(len(targets)))]
+            opened.faults.inject(str(kind), target=target, at_s=float(rng.uniform(0, LATEST_S)))
+        client = opened.client.client
+        for camera, sram in zip((0, 1, 0, 1), rng.integers(0, 2, 4).tolist(), strict=True):
+            try:
+                client.command("CaptureAndDetect", Camera=camera, Sram=sram)
+            except HostError:
+                client.pause(0.05)
+            client.pause(0.4)
+        recorder.close()
+        board = opened.board
+        return {
+            # without the header, which names the gateware
+            "recording": recording.getvalue().splitlines()[1:],
+            "memories": [memory.tobytes() for memory in board.sites().all_memories().values()],
+            "violations": (board.engine.violations, dict(board.engine.violation_counts)),
             "now": board.kernel.now,
         }

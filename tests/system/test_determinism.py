@@ -17,7 +17,7 @@ from cubestack.hdl.flow.top import tops_in
 from cubestack.hdl.flow.verilog import verilog_file
 from cubestack.host.emulation.emulated import open_device
 from tests.system.conftest import Ear
-from tests.system.life import life
+from tests.system.life import life, pair_life
 from tests.tiers import quick
 
 SKY = SkyScene.pointing(84, -1)
@@ -89,42 +89,6 @@ def test_exported_verilog_does_not_change_the_run(file: str, seed: int, exported
         one["recording"] = str(one["recording"]).splitlines()[1:]
         del one["registers"], one["faults"]
     assert given == shipped
-
-
-def pair_life(seed: int, gateware: str = "") -> dict[str, object]:
-    """Traffic and final state of a CubeSense with random poses, memories and faults."""
-    rng = np.random.default_rng(seed)
-    scene = EarthSunScene.facing(
-        sun_deg=tuple(rng.uniform(-20, 20, 2)), nadir_deg=tuple(rng.uniform(-15, 15, 2))
-    )
-    design = {"gateware": gateware} if gateware else {}
-    view = EarthSunView(scene, FisheyeCondition(hot_pixels=20, seed=seed))
-    with open_device("cubesense", view, seed=seed, engine="compiled", **design) as opened:
-        recording = StringIO()
-        recorder = start_recorder(opened, recording)
-        kinds = [kind for kind, fault in FAULTS.items() if opened.faults.targets(fault.site)]
-        kinds = [kind for kind in kinds if not kind.startswith("register-")]
-        opened.faults.seed = seed
-        for kind in rng.choice(kinds, FAULTS_AT_ONCE):
-            targets = opened.faults.targets(FAULTS[kind].site)
-            target = targets[int(rng.integers(len(targets)))]
-            opened.faults.inject(str(kind), target=target, at_s=float(rng.uniform(0, LATEST_S)))
-        client = opened.client.client
-        for camera, sram in zip((0, 1, 0, 1), rng.integers(0, 2, 4).tolist(), strict=True):
-            try:
-                client.command("CaptureAndDetect", Camera=camera, Sram=sram)
-            except HostError:
-                client.pause(0.05)
-            client.pause(0.4)
-        recorder.close()
-        board = opened.board
-        return {
-            # without the header, which names the gateware
-            "recording": recording.getvalue().splitlines()[1:],
-            "memories": [memory.tobytes() for memory in board.sites().all_memories().values()],
-            "violations": (board.engine.violations, dict(board.engine.violation_counts)),
-            "now": board.kernel.now,
-        }
 
 
 @pytest.fixture(scope="module")
