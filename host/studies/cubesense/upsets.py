@@ -26,17 +26,22 @@ from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.firmware_model.interface.cubesense.codes import Camera, Sram
 from cubestack.firmware_model.interface.cubesense.fpga import Action, actions
 from cubestack.firmware_model.interface.cubesense.pins import CONTROLS
-from cubestack.firmware_model.interface.cubesense.switches import DEFAULT_SWITCHES
+from cubestack.firmware_model.interface.cubesense.switches import (
+    DEFAULT_SWITCHES,
+    CubeSenseSwitches,
+)
 from cubestack.firmware_model.values import text
 from cubestack.host.clients.cubesense.client import CubeSense
 from cubestack.host.emulation.emulated import EmulatedDevice
 from cubestack.host.experiments.cubesense.measure import CubeSenseOptions, is_right, random_view
-from cubestack.host.sensors.cubesense import VARIANTS
 from cubestack.host.studies.upsets.experiment import UpsetExperiment
 from cubestack.host.studies.upsets.gateware import DECIDED, GatewareUpsetOptions
 from cubestack.host.studies.upsets.subject import BETWEEN, IDLE, STORING, Rig, Subject, UpsetVerdict
 
 LINKED, READING = "linked", "reading"
+
+#: Shipped variants of the FPGAs.
+VARIANTS = CubeSenseSwitches.declared()["gateware"].choices
 
 #: Largest angle of the Sun, so that the Earth is in the nadir camera's field.
 SUN_ANGLE_DEG = 25.0
