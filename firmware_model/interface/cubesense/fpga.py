@@ -8,6 +8,7 @@ CubeSense thesis, tables 6.3 and 6.4 (commands), section 6.4.4 (address), sectio
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from enum import Enum
+from itertools import product
 from typing import NamedTuple
 
 
@@ -100,6 +101,16 @@ def link_shows_enables(shift: int, edge: int) -> bool:
     HREF. An FPGA that is enabled alone then acts as if the other were enabled too.
     """
     return not (shift and not edge)
+
+
+def settled_rows(
+    *, mcu_addressing: bool = False
+) -> Iterator[tuple[tuple[int, int, int, int, int], Actions]]:
+    """Levels as in :func:`actions`, and the actions, wherever each FPGA can know them."""
+    for shift, edge, rnw, sunen, naden in product((0, 1), repeat=5):
+        if sunen == naden or link_shows_enables(shift, edge):
+            levels = shift, edge, rnw, sunen, naden
+            yield levels, actions(*levels, mcu_addressing=mcu_addressing)
 
 
 #: Data clocks, and bytes, of an address.

@@ -1,8 +1,6 @@
 """Functional coverage of CubeSense's contract."""
 
-from itertools import product
-
-from cubestack.firmware_model.interface.cubesense.fpga import Action, actions, link_shows_enables
+from cubestack.firmware_model.interface.cubesense.fpga import Action, settled_rows
 from cubestack.firmware_model.interface.cubesense.pins import PREFIXES
 from cubestack.hdl.contract.points import Coverage, Group
 
@@ -10,12 +8,7 @@ _SIDES = tuple(map(str, PREFIXES))
 _PLACE = {"camera": _SIDES, "memory": _SIDES}
 
 #: Levels of the lines in which both FPGAs are in standby, and each knows it.
-IDLE_ROWS = tuple(
-    levels
-    for levels in product((0, 1), repeat=5)
-    if {*actions(*levels)} == {Action.STANDBY}
-    and (link_shows_enables(*levels[:2]) or levels[3] == levels[4])
-)
+IDLE_ROWS = tuple(levels for levels, actions in settled_rows() if {*actions} == {Action.STANDBY})
 
 POINTS = {
     "image": Group(

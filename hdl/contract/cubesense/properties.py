@@ -1,60 +1,156 @@
-"""CubeSense's rules of drivers and memories as properties of the pair's pins."""
+"""CubeSense's handshake as properties of the pair's pins; none names a register of the design."""
 
+from collections.abc import Collection, Iterator
 from types import SimpleNamespace
 
-from amaranth.hdl import Assert, Module
+from amaranth.hdl import Assert, Assume, Cat, Const, Module, Value
 
+from cubestack.firmware_model.interface.cubesense.fpga import Action, settled_rows
 from cubestack.firmware_model.interface.cubesense.pins import PREFIXES
+from cubestack.hdl.contract import pin_properties as pins
 from cubestack.hdl.contract.contract import Property
 from cubestack.hdl.proofs.model import past
-from cubestack.hdl.proofs.properties import first_step
+from cubestack.hdl.proofs.properties import first_step, one_sram_driver
+
+_STANDBY = {Action.STANDBY}
+_STORES = {Action.STORE, Action.STORE_OTHER}
+_READS = {Action.READ, Action.EDGE, Action.SEND_EDGE}
+PRESENTS = {Action.READ, Action.EDGE, Action.PASS_EDGE, Action.READ_FROM}
 
 
-def _drivers(m: Module, d: SimpleNamespace) -> None:
-    m.d.comb += Assert(d.CONTENTION == 0, "two FPGAs drive one wire")
-    for prefix in PREFIXES.values():
-        driven, read_n = getattr(d, f"{prefix}SRAM_D_OE"), getattr(d, f"{prefix}SRAM_OE_N")
-        m.d.comb += Assert(~driven | read_n, f"FPGA and SRAM both drive {prefix}SRAM_D")
+def _sides(d: SimpleNamespace) -> Iterator[tuple[str, str, Value]]:
+    """Side, its SRAM and its ACK."""
+    for side, prefix in PREFIXES.items():
+        yield str(side), f"{prefix}SRAM", getattr(d, f"{prefix.rstrip('_')}ACK")
+
+
+def at_levels(d: SimpleNamespace, levels: Collection[int]) -> Value:
+    lines = Cat(d.SHIFT, d.EDGE, d.RNW, d.SUNEN, d.NADEN)
+    return lines == Cat(Const(level, 1) for level in levels)
+
+
+def _during(d: SimpleNamespace, side: str, wanted: Collection[Action]) -> Value:
+    rows = [levels for levels, row in settled_rows() if getattr(row, side) in wanted]
+    return Cat(at_levels(d, levels) for levels in rows).any()
+
+
+def drivers(m: Module, d: SimpleNamespace) -> None:
+    m.d.comb += Assert(d.CONTENTION == 0, "no wire has two drivers")
+    for _, sram, _ in _sides(d):
+        one_sram_driver(m, d, sram)
 
 
 def _standby(m: Module, d: SimpleNamespace) -> None:
-    standby = d.SUNEN & d.NADEN
-    for prefix in PREFIXES.values():
-        for name, active in (("D_OE", 1), ("CE_N", 0), ("OE_N", 0), ("WE_N", 0)):
-            pin = f"{prefix}SRAM_{name}"
-            m.d.comb += Assert(
-                ~standby | (getattr(d, pin) != active), f"{pin} is active in standby"
-            )
-    m.d.comb += [
-        Assert(~standby | ~d.SUNACK, "SUNACK is high in standby"),
-        Assert(~standby | ~d.NADACK, "NADACK is high in standby"),
-        Assert(~standby | ~d.DATA_OE, "an FPGA drives DATA in standby"),
-    ]
+    """Also at levels that are no row of the command table."""
+    for side, sram, ack in _sides(d):
+        standby = _during(d, side, _STANDBY)
+        pins.rests(m, d, standby, sram)
+        m.d.comb += Assert(~standby | ~ack, f"the {side} ACK is low in standby")
 
 
 def _reading(m: Module, d: SimpleNamespace) -> None:
-    reading = d.RNW & ~d.SHIFT
-    for prefix in PREFIXES.values():
-        pin = f"{prefix}SRAM_WE_N"
-        m.d.comb += Assert(~reading | getattr(d, pin), f"{pin} is low while an image is read")
+    words = "while an image is read"
+    for side, sram, ack in _sides(d):
+        reading = _during(d, side, _READS)
+        pins.is_not_written(m, d, reading, words, sram)
+        m.d.comb += [
+            Assert(~reading | ~ack, f"the {side} ACK is low {words}"),
+            Assert(~reading | ~getattr(d, f"{sram}_OE_N"), f"{sram}_OE_N is low {words}"),
+        ]
+
+
+def _presents(m: Module, d: SimpleNamespace) -> None:
+    for levels, row in settled_rows():
+        driven = bool(PRESENTS & {*row}) == d.DATA_OE
+        text = f"DATA is driven only where bytes are presented, at levels {levels}"
+        m.d.comb += Assert(~at_levels(d, levels) | driven, text)
+    held = Cat(d.SHIFT, d.EDGE, d.RNW, d.SUNEN, d.NADEN)
+    goes_on = ~first_step() & (held == past(m, held)) & d.DATA_OE & (~d.CLK | past(m, d.CLK))
+    for side in map(str, PREFIXES):
+        steady = goes_on & _during(d, side, {Action.READ, Action.EDGE})
+        text = "DATA stays until the next data clock"
+        m.d.comb += Assert(~steady | (past(m, d.DATA) == d.DATA), text)
 
 
 def _pulses(m: Module, d: SimpleNamespace) -> None:
-    for prefix in PREFIXES.values():
-        pins = {name: getattr(d, f"{prefix}SRAM_{name}") for name in ("A", "D_OE", "CE_N", "WE_N")}
-        low = ~pins["WE_N"]
-        m.d.comb += [
-            Assert(~low | pins["D_OE"], f"{prefix}SRAM_WE_N is low while nothing drives the data"),
-            Assert(~low | ~pins["CE_N"], f"{prefix}SRAM_WE_N is low without chip enable"),
-        ]
-        goes_on = low & past(m, low) & ~first_step()
-        same = pins["A"] == past(m, pins["A"])
-        m.d.comb += Assert(~goes_on | same, f"{prefix}SRAM_A changes while SRAM_WE_N is low")
+    for prefix, (_, sram, _) in zip(PREFIXES.values(), _sides(d), strict=True):
+        clock, href, pixel = (getattr(d, prefix + name) for name in ("PCLK", "HREF", "Y"))
+        pins.camera_is_steady(m, clock, href, pixel)
+        pins.whole_pulses(m, d, sram)
+
+
+def _starts(m: Module, d: SimpleNamespace) -> None:
+    """Both cameras have one clock; a command comes at once, and stays."""
+    standby = d.SUNEN & d.NADEN
+    m.d.comb += Assume(d.SUN_PCLK == d.NAD_PCLK)
+    pins.starts_in_standby(m, d.SUN_PCLK, standby)
+    lines = Cat(d.SHIFT, d.EDGE, d.RNW)
+    held = (lines == past(m, lines)) & (~d.SUNEN | past(m, d.SUNEN))
+    came = past(m, standby) | (past(m, d.NADEN) == d.NADEN)
+    m.d.comb += Assume(first_step() | (held & came & (~d.NADEN | past(m, d.NADEN))))
+
+
+def _one_store(m: Module, d: SimpleNamespace) -> None:
+    _starts(m, d)
+    pins.camera_runs(m, d.SUN_PCLK, d.SUN_HREF, d.NAD_HREF)
+    dark = (d.SUN_Y == 0) & (d.NAD_Y == 0) & (d.SUN_SRAM_D_I == 0) & (d.NAD_SRAM_D_I == 0)
+    m.d.comb += Assume(d.SUN_HREF == d.NAD_HREF)
+    m.d.comb += Assume(~d.CLK & ~(d.EDGE | (d.RNW & ~d.SHIFT)) & dark)
+
+
+def _inside(m: Module, d: SimpleNamespace) -> None:
+    _one_store(m, d)
+    for _, sram, _ in _sides(d):
+        pins.writes_inside(m, getattr(d, f"{sram}_WE_N"), _position(d, sram), d.size)
+
+
+def _acknowledges(m: Module, d: SimpleNamespace) -> None:
+    _one_store(m, d)
+    for side, sram, ack in _sides(d):
+        pins.acknowledges(
+            m,
+            f"{sram.partition('_')[0]}ACK",
+            storing=_during(d, side, _STORES),
+            write_n=getattr(d, f"{sram}_WE_N"),
+            position=_position(d, sram),
+            ack=ack,
+            size=d.size,
+        )
+
+
+def _reads(m: Module, d: SimpleNamespace) -> None:
+    """SRAMs whose bytes are their positions; the cameras stand still while one is read."""
+    _starts(m, d)
+    goes_on = ~(d.SUNEN & d.NADEN) & ~past(m, d.SUNEN & d.NADEN)
+    m.d.comb += Assume(~goes_on | first_step() | (past(m, d.SUN_PCLK) == d.SUN_PCLK))
+    m.d.comb += Assume(~d.SHIFT & ~d.EDGE & d.RNW & (d.SUNEN | d.NADEN))
+    reading = ~(d.SUNEN & d.NADEN)
+    pins.data_clock_waits(m, d.CLK, reading)
+    for side, sram, _ in _sides(d):
+        m.d.comb += Assume(pins.byte_at(*_position(d, sram)) == getattr(d, f"{sram}_D_I"))
+        pins.reads_in_order(m, d, side, d.CLK, _during(d, side, {Action.READ}), d.size)
+
+
+def _position(d: SimpleNamespace, sram: str) -> tuple[Value, Value]:
+    bits = (d.size.columns - 1).bit_length()
+    address = getattr(d, f"{sram}_A")
+    return address[:bits], address[bits:]
 
 
 PROPERTIES = {
-    "one-driver": Property("No wire has two drivers", _drivers),
-    "standby": Property("In standby no pin is active", _standby),
+    "one-driver": Property("No wire has two drivers", drivers),
+    "standby": Property(
+        "In standby, and at levels that are no command, no pin is active", _standby
+    ),
     "no-write-while-reading": Property("While an image is read nothing is written", _reading),
-    "whole-pulses": Property("The address is stable in each write pulse", _pulses, steps=6),
+    "presents": Property(
+        "DATA is driven exactly at the commands that read, and changes with the data clock only",
+        _presents,
+    ),
+    "whole-pulses": Property("Address and data are stable in each write pulse", _pulses, steps=6),
+    "inside": Property("Writes stay inside of the image", _inside, steps=30),
+    "ack": Property(
+        "ACK rises only after all rows of a frame are written in order", _acknowledges, steps=24
+    ),
+    "read": Property("The n-th data clock presents the n-th byte", _reads),
 }

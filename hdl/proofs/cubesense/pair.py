@@ -2,14 +2,14 @@
 
 from collections.abc import Collection
 from functools import partial
-from itertools import product
 from types import SimpleNamespace
 
 from amaranth.hdl import Assert, Cat, Const, Module, Mux, Signal
 
 from cubestack.firmware_model.interface.cubesense import fpga as table
 from cubestack.firmware_model.interface.cubesense.fpga import ADDRESS_BYTES, Action
-from cubestack.firmware_model.interface.cubesense.pins import FPGA, PREFIXES
+from cubestack.firmware_model.interface.cubesense.pins import FPGA
+from cubestack.hdl.contract.cubesense import properties as contract
 from cubestack.hdl.cubesense.dataflow import SIDES, Side
 from cubestack.hdl.cubesense.pair import CubeSensePair
 from cubestack.hdl.proofs import properties
@@ -75,7 +75,6 @@ def _acknowledges(m: Module, d: SimpleNamespace) -> None:
 
 # No wire has two active drivers in any settled state.
 
-_DRIVES_DATA = {Action.READ, Action.EDGE, Action.PASS_EDGE, Action.READ_FROM}
 _DRIVES_LINK = {Action.SEND_PICTURE, Action.SEND_EDGE}
 
 _DRIVERS = {
@@ -86,21 +85,13 @@ _DRIVERS = {
 
 
 def _drivers(mcu_addressing: bool, m: Module, d: SimpleNamespace) -> None:
-    m.d.comb += Assert(d.CONTENTION == 0, "no wire has two drivers")
-    for prefix in PREFIXES.values():
-        properties.one_sram_driver(m, d, f"{prefix}SRAM")
-    # Each combination of levels that the wires can tell from the others, listed or not.
-    lines = Cat(d.SHIFT, d.EDGE, d.RNW, d.SUNEN, d.NADEN)
-    for levels in product((0, 1), repeat=5):
-        shift, edge, _, sunen, naden = levels
-        if sunen != naden and not table.link_shows_enables(shift, edge):
-            continue
-        here = lines == Cat(Const(level, 1) for level in levels)
-        for side, action in table.actions(*levels, mcu_addressing=mcu_addressing)._asdict().items():
-            data = getattr(d, f"{side}_DATA_OE") == (action in _DRIVES_DATA)
+    contract.drivers(m, d)
+    for levels, actions in table.settled_rows(mcu_addressing=mcu_addressing):
+        for side, action in actions._asdict().items():
+            data = getattr(d, f"{side}_DATA_OE") == (action in contract.PRESENTS)
             link = getattr(d, f"{side}_LINK_D_OE") == (action in _DRIVES_LINK)
             text = f"at levels {levels} the {side} FPGA drives what its action {action} needs"
-            m.d.comb += Assert(~here | (data & link), text)
+            m.d.comb += Assert(~contract.at_levels(d, levels) | (data & link), text)
     if mcu_addressing:
         microcontroller_may = (~d.SHIFT & ~d.RNW) | (d.SUNEN & d.NADEN)
         text = "DATA is free while the microcontroller may drive it"

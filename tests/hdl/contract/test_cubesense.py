@@ -6,6 +6,7 @@ import pytest
 
 from cubestack.hdl.contract.cubesense.declared import CONTRACT
 from cubestack.hdl.contract.design import Design
+from cubestack.hdl.contract.proving import prove_contract
 from cubestack.hdl.contract.running import run_checks
 from cubestack.hdl.flow.tools import have_yosys
 from cubestack.hdl.flow.verilog import verilog_file
@@ -117,3 +118,54 @@ def test_exported_verilog_passes_at_full_size(tmp_path: Path) -> None:
     report = run_checks(design, waves=tmp_path)
     assert "stores_and_reads_whole_frames" in {result.name for result in report.results}
     assert not [(result.name, result.error) for result in report.failed]
+
+
+#: Properties that take minutes, and hold for so many steps.
+BOUNDED = ("inside", "ack")
+
+#: By property, as above.
+PROPERTIES = {
+    "one-driver": (
+        "cubesense.top",
+        "self.DATA_OE.eq(presenting | mode.pass_edge)",
+        "self.DATA_OE.eq(reading | mode.pass_edge)",
+    ),
+    "standby": (
+        "cubesense.dataflow",
+        "(self.edge, command.edge),",
+        "(self.edge, command.edge if command.rnw else None),",
+    ),
+    "no-write-while-reading": (
+        "cubesense.top",
+        "is_sun else mode.store\n",
+        "is_sun else mode.store | mode.read\n",
+    ),
+    "presents": (
+        "cubesense.top",
+        "self.DATA_OE.eq(presenting | mode.pass_edge)",
+        "self.DATA_OE.eq(presenting)",
+    ),
+    "whole-pulses": ("cubesense.top", "~((own_stores & ~self.PCLK)", "~((own_stores)"),
+    "inside": ("blocks.counters", "column == self._columns - 1", "column == self._columns"),
+    "ack": (
+        "blocks.frames",
+        "self.ack | (storing_last_column & counter.last_row)",
+        "self.ack | (self.store & counter.last_row)",
+    ),
+    "read": ("cubesense.reader", "picture.next_column.eq(1)", "picture.next_column.eq(0)"),
+}
+
+
+@pytest.mark.filterwarnings("ignore::amaranth.hdl.UnusedElaboratable")
+@pytest.mark.parametrize("name", quick_ones(PROPERTIES, "presents"))
+def test_planted_bug_is_refuted_by_its_property(name: str) -> None:
+    assert {*PROPERTIES} == {*CONTRACT.properties}
+    with planted(Bug("", "", *PROPERTIES[name], ())):
+        design = Design(CONTRACT)
+        (verdict,) = prove_contract(design, {name: CONTRACT.properties[name]})
+    assert verdict.shown
+
+
+def test_shipped_pair_is_proved() -> None:
+    chosen = {name: one for name, one in CONTRACT.properties.items() if name not in BOUNDED}
+    assert all(verdict.proved for verdict in prove_contract(Design(CONTRACT), chosen))

@@ -143,7 +143,7 @@ def test_pair_with_planted_contention_is_refuted(monkeypatch: pytest.MonkeyPatch
         Design(cubesense.CONTRACT), properties_of(Design(cubesense.CONTRACT), "one")
     )
     assert verdict.shown is not None
-    assert verdict.shown.violated == ("two FPGAs drive one wire",)
+    assert verdict.shown.violated == ("no wire has two drivers",)
 
 
 def test_bounded_proof_states_how_far_it_holds() -> None:
