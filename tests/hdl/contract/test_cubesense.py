@@ -120,7 +120,7 @@ def test_exported_verilog_passes_at_full_size(tmp_path: Path) -> None:
     assert not [(result.name, result.error) for result in report.failed]
 
 
-#: Properties that take minutes, and hold for so many steps.
+#: Properties whose proofs take about a minute.
 BOUNDED = ("inside", "ack")
 
 #: By property, as above.
