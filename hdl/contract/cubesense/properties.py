@@ -3,19 +3,19 @@
 from collections.abc import Collection, Iterator
 from types import SimpleNamespace
 
-from amaranth.hdl import Assert, Assume, Cat, Const, Module, Value
+from amaranth.hdl import Assert, Assume, Cat, Module, Value
 
 from cubestack.firmware_model.interface.cubesense.fpga import Action, settled_rows
 from cubestack.firmware_model.interface.cubesense.pins import PREFIXES
 from cubestack.hdl.contract import pin_properties as pins
 from cubestack.hdl.contract.contract import Property
+from cubestack.hdl.proofs.cubesense.pins import PRESENTS, at_levels, drivers
 from cubestack.hdl.proofs.model import past
-from cubestack.hdl.proofs.properties import first_step, one_sram_driver
+from cubestack.hdl.proofs.properties import first_step
 
 _STANDBY = {Action.STANDBY}
 _STORES = {Action.STORE, Action.STORE_OTHER}
 _READS = {Action.READ, Action.EDGE, Action.SEND_EDGE}
-PRESENTS = {Action.READ, Action.EDGE, Action.PASS_EDGE, Action.READ_FROM}
 
 
 def _sides(d: SimpleNamespace) -> Iterator[tuple[str, str, Value]]:
@@ -24,20 +24,9 @@ def _sides(d: SimpleNamespace) -> Iterator[tuple[str, str, Value]]:
         yield str(side), f"{prefix}SRAM", getattr(d, f"{prefix.rstrip('_')}ACK")
 
 
-def at_levels(d: SimpleNamespace, levels: Collection[int]) -> Value:
-    lines = Cat(d.SHIFT, d.EDGE, d.RNW, d.SUNEN, d.NADEN)
-    return lines == Cat(Const(level, 1) for level in levels)
-
-
 def _during(d: SimpleNamespace, side: str, wanted: Collection[Action]) -> Value:
     rows = [levels for levels, row in settled_rows() if getattr(row, side) in wanted]
     return Cat(at_levels(d, levels) for levels in rows).any()
-
-
-def drivers(m: Module, d: SimpleNamespace) -> None:
-    m.d.comb += Assert(d.CONTENTION == 0, "no wire has two drivers")
-    for _, sram, _ in _sides(d):
-        one_sram_driver(m, d, sram)
 
 
 def _standby(m: Module, d: SimpleNamespace) -> None:

@@ -9,10 +9,10 @@ from amaranth.hdl import Assert, Cat, Const, Module, Mux, Signal
 from cubestack.firmware_model.interface.cubesense import fpga as table
 from cubestack.firmware_model.interface.cubesense.fpga import ADDRESS_BYTES, Action
 from cubestack.firmware_model.interface.cubesense.pins import FPGA
-from cubestack.hdl.contract.cubesense import properties as contract
 from cubestack.hdl.cubesense.dataflow import SIDES, Side
 from cubestack.hdl.cubesense.pair import CubeSensePair
 from cubestack.hdl.proofs import properties
+from cubestack.hdl.proofs.cubesense import pins
 from cubestack.hdl.proofs.cubesense.designs import column_row, fpga, proof_design
 from cubestack.hdl.proofs.cubesense.edge import as_flown_proofs, edge_proofs
 from cubestack.hdl.proofs.properties import AUXILIARY, starts_in, wires_below, writer_wires
@@ -85,13 +85,13 @@ _DRIVERS = {
 
 
 def _drivers(mcu_addressing: bool, m: Module, d: SimpleNamespace) -> None:
-    contract.drivers(m, d)
+    pins.drivers(m, d)
     for levels, actions in table.settled_rows(mcu_addressing=mcu_addressing):
         for side, action in actions._asdict().items():
-            data = getattr(d, f"{side}_DATA_OE") == (action in contract.PRESENTS)
+            data = getattr(d, f"{side}_DATA_OE") == (action in pins.PRESENTS)
             link = getattr(d, f"{side}_LINK_D_OE") == (action in _DRIVES_LINK)
             text = f"at levels {levels} the {side} FPGA drives what its action {action} needs"
-            m.d.comb += Assert(~contract.at_levels(d, levels) | (data & link), text)
+            m.d.comb += Assert(~pins.at_levels(d, levels) | (data & link), text)
     if mcu_addressing:
         microcontroller_may = (~d.SHIFT & ~d.RNW) | (d.SUNEN & d.NADEN)
         text = "DATA is free while the microcontroller may drive it"
