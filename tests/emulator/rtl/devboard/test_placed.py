@@ -49,9 +49,10 @@ def fault(kind: str, engine: str) -> object:
 
 
 def conformance(name: str, engine: str) -> object:
+    """With writes for one camera: two that store at once take an hour."""
     target = open_target(f"emulated:{name}", engine=engine)
     try:
-        checks = run_suite(target, allow_write=True).checks
+        checks = run_suite(target, allow_write=name == "cubestar").checks
     finally:
         target.close()
     assert any(check.verdict.value == "passed" for check in checks)
