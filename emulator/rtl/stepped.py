@@ -4,6 +4,7 @@ from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from sys import maxsize
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +33,8 @@ class Stream:
 class SteppedEngine(RtlEngine):
     """The design is behind ``_get`` and ``_put``, which settles it.
 
-    With ``skipping``, it runs at most the wiring's ``settling_clocks`` of a period between lines.
+    With ``skipping``, it runs at most the wiring's ``settling_clocks`` between two lines. Of
+    a user's design it runs all, as that number is not proved.
     """
 
     def __init__(
@@ -42,6 +44,7 @@ class SteppedEngine(RtlEngine):
         timing = sram_timing or SramTiming()
         self._srams = [Sram(memory, timing, self._log, n) for n, memory in self.memories.items()]
         self._streams = [Stream(pins) for pins in wiring.cameras]
+        self._settling_clocks = maxsize if wiring.foreign else wiring.settling_clocks
         self._contention = 0
 
     @abstractmethod
@@ -126,7 +129,7 @@ class SteppedEngine(RtlEngine):
             return
         self._drive(time_ps, stream.pins.clock, 1)
         stream.low_clocks = 0 if self._get(stream.pins.line) else stream.low_clocks + 1
-        if self._skipping and stream.low_clocks >= self.wiring.settling_clocks:
+        if self._skipping and stream.low_clocks >= self._settling_clocks:
             # Continue with the falling edge of the last sample of this low run that is in reach.
             in_reach = (loaded.first_edge(until_ps + 1) - 1) // 2
             last = min(loaded.low_until(stream.edge // 2) - 1, in_reach)

@@ -190,7 +190,7 @@ class DevboardEngine(SteppedEngine):
         most = min(self.link.limit - 16, MOST_EDGES // 2)
         while sample < end:
             low = not loaded.sample(sample)[0]
-            if self._skipping and low and low_clocks >= self.wiring.settling_clocks:
+            if self._skipping and low and low_clocks >= self._settling_clocks:
                 # Continue with the last sample of this low run that is in reach.
                 sample = min(loaded.low_until(sample), end) - 1
             following = min(sample + 1, loaded.segment.clocks - 1)
@@ -207,7 +207,7 @@ class DevboardEngine(SteppedEngine):
                 last = low_end if low_end == loaded.segment.clocks else low_end - 1
                 count = min(last, end, sample + MOST_EDGES // 2) - sample
                 if self._skipping:
-                    needed = self.wiring.settling_clocks - (low_clocks if low else -1)
+                    needed = self._settling_clocks - (low_clocks if low else -1)
                     count = min(count, max(1, needed))
                 low_clocks = low_clocks + count if low else count - 1
                 yield _Clocks(sample, count, 0, b"", low_clocks)

@@ -1,24 +1,28 @@
 """Foreign designs of CubeStar store and read what the shipped one does."""
 
+from collections.abc import Callable
 from fractions import Fraction
 
 import numpy as np
 import pytest
+from amaranth.hdl import ClockDomain, ClockSignal, Module, Signal
 
 from cubestack.emulator.boards.cubestar.wiring import cubestar_wiring
 from cubestack.emulator.native.compiler import find_compiler
 from cubestack.emulator.rtl.benchmark import RepeatedFrame
 from cubestack.emulator.rtl.contract import RtlEngine
 from cubestack.emulator.rtl.cxxrtl.engine import CompiledEngine
+from cubestack.emulator.rtl.simulated import SimulatedEngine
+from cubestack.emulator.rtl.wiring import Wiring
+from cubestack.hdl.blocks.pinned import PinnedComponent
 from cubestack.hdl.cubestar.top import CubeStarTop
 from cubestack.hdl.flow.tools import have_yosys
 from tests.hdl.user.designs import WORKING, load_design
 from tests.tiers import quick_ones
 
-pytestmark = [
-    pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler"),
-    pytest.mark.skipif(not have_yosys(), reason="no whole Yosys"),
-]
+from .devboard.boards import direct
+
+pytestmark = [pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")]
 
 COLUMNS, ROWS = 18, 5
 PERIOD = Fraction(100_000)
@@ -54,6 +58,7 @@ def store_and_read(engine: RtlEngine, joined_at: float) -> tuple[bytes, bytes, b
     return engine.sram.tobytes(), out.tobytes(), acknowledged, kinds
 
 
+@pytest.mark.skipif(not have_yosys(), reason="no whole Yosys")
 @pytest.mark.parametrize("skipping", [True, False])
 @pytest.mark.parametrize("name", quick_ones(WORKING, "generated_clock", "negative_edge", "latch"))
 def test_foreign_design_stores_and_reads_like_the_shipped_one(name: str, skipping: bool) -> None:
@@ -64,3 +69,44 @@ def test_foreign_design_stores_and_reads_like_the_shipped_one(name: str, skippin
         found = store_and_read(CompiledEngine(foreign, skipping=skipping), joined_at)
         assert found == expected
     assert expected[2:] == (True, [])
+
+
+class PauseCounter(PinnedComponent):
+    """ACK rises after a number of pixel clocks between two lines."""
+
+    def __init__(self) -> None:
+        super().__init__(CubeStarTop(COLUMNS, ROWS).pins)
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        m.domains.pix = ClockDomain(reset_less=True)
+        count = Signal(8)
+        m.d.comb += [
+            ClockSignal("pix").eq(self.PIXCLK),
+            self.ACK.eq(count == GAP - 5),
+            *(strobe.eq(1) for strobe in (self.SRAM_CE_N, self.SRAM_OE_N, self.SRAM_WE_N)),
+        ]
+        with m.If(self.HSYNC):
+            m.d.pix += count.eq(0)
+        with m.Elif(count != GAP - 5):
+            m.d.pix += count.eq(count + 1)
+        return m
+
+
+def acknowledged_ps(engine: RtlEngine) -> int:
+    engine.attach(RepeatedFrame(np.zeros((ROWS, COLUMNS), np.uint8), PERIOD, COLUMNS + GAP, GAP))
+    engine.run(int((COLUMNS + GAP) * PERIOD))  # into the first lines
+    engine.set_pin("ENABLE", 1)
+    engine.run(int(10 * ROWS * (COLUMNS + GAP) * PERIOD), ("ACK", 1))
+    engine.close()
+    return engine.now_ps
+
+
+@pytest.mark.parametrize("engine", [SimulatedEngine, direct])
+def test_engines_run_each_clock_between_lines_of_a_user_s_design(
+    engine: Callable[[Wiring], RtlEngine],
+) -> None:
+    foreign = cubestar_wiring(CubeStarTop(COLUMNS, ROWS)).with_design(PauseCounter())
+    expected = acknowledged_ps(CompiledEngine(foreign, skipping=False))
+    assert expected < int(2 * (COLUMNS + GAP) * PERIOD) + GAP * PERIOD
+    assert acknowledged_ps(engine(foreign)) == expected
