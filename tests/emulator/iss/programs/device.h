@@ -92,6 +92,44 @@ typedef struct {
 } RMU_TypeDef;
 
 typedef struct {
+    __IO uint32_t CTRL, INPUTSEL, STATUS, IEN, IF, IFS, IFC, ROUTE;
+} ACMP_TypeDef;
+
+typedef struct {
+    __IO uint32_t CTRL, INPUTSEL, STATUS, IEN, IF, IFS, IFC;
+} VCMP_TypeDef;
+
+typedef struct {
+    __IO uint32_t CTRL, STATUS, CH0CTRL, CH1CTRL, IEN, IF, IFS, IFC, CH0DATA, CH1DATA, COMBDATA,
+        CAL, BIASPROG;
+} DAC_TypeDef;
+
+typedef struct {
+    __IO uint32_t CTRL, CMD, STATUS, CNT, TOP, TOPB, IF, IFS, IFC, IEN, ROUTE, FREEZE, SYNCBUSY;
+} PCNT_TypeDef;
+
+typedef struct {
+    __IO uint32_t CTRL, CMD, STATUS, CLKDIV, STARTFRAME, SIGFRAME, RXDATAX, RXDATA, RXDATAXP,
+        TXDATAX, TXDATA, IF, IFS, IFC, IEN, PULSECTRL, FREEZE, SYNCBUSY;
+} LEUART_TypeDef;
+
+typedef struct {
+    __IO uint32_t CTRL, CMD, STATUS, IEN, IF, IFS, IFC, DATA, XORDATA, RESERVED0[3], KEYLA, KEYLB,
+        KEYLC, KEYLD, KEYHA, KEYHB, KEYHC, KEYHD;
+} AES_TypeDef;
+
+typedef struct {
+    __IO uint32_t TIMING, INTERACT, EVAL, RESERVED0;
+} LESENSE_CH_TypeDef;
+
+typedef struct {
+    __IO uint32_t CTRL, TIMCTRL, PERCTRL, DECCTRL, BIASCTRL, CMD, CHEN, SCANRES, STATUS, PTR,
+        BUFDATA, CURCH, DECSTATE, SENSORSTATE, IDLECONF, ALTEXCONF, IF, IFC, IFS, IEN, SYNCBUSY,
+        ROUTE, POWERDOWN, RESERVED0[105], ST[32], BUF[16];
+    LESENSE_CH_TypeDef CH[16];
+} LESENSE_TypeDef;
+
+typedef struct {
     __IO uint32_t CTRL, LOAD, VAL, CALIB;
 } SysTick_Type;
 
@@ -114,13 +152,21 @@ typedef struct {
 #define LETIMER0 ((LETIMER_TypeDef *)0x40082000UL)
 #define MSC ((MSC_TypeDef *)0x400C0000UL)
 #define WDOG ((WDOG_TypeDef *)0x40088000UL)
+#define ACMP0 ((ACMP_TypeDef *)0x40001000UL)
+#define VCMP ((VCMP_TypeDef *)0x40000000UL)
+#define DAC0 ((DAC_TypeDef *)0x40004000UL)
+#define PCNT0 ((PCNT_TypeDef *)0x40086000UL)
+#define LEUART0 ((LEUART_TypeDef *)0x40084000UL)
+#define AES ((AES_TypeDef *)0x400E0000UL)
+#define LESENSE ((LESENSE_TypeDef *)0x4008C000UL)
 #define RMU ((RMU_TypeDef *)0x400CA000UL)
 #define SysTick ((SysTick_Type *)0xE000E010UL)
 #define SCB ((SCB_Type *)0xE000ED00UL)
 #define NVIC_ISER ((__IO uint32_t *)0xE000E100UL)
 enum {
-    DMA_IRQn = 0, ADC0_IRQn = 7, I2C0_IRQn = 9, UART0_RX_IRQn = 20, LETIMER0_IRQn = 26, RTC_IRQn = 30,
-    BURTC_IRQn = 31
+    DMA_IRQn = 0, ACMP0_IRQn = 6, ADC0_IRQn = 7, I2C0_IRQn = 9, LESENSE_IRQn = 17,
+    UART0_RX_IRQn = 20, LEUART0_IRQn = 24, LETIMER0_IRQn = 26, PCNT0_IRQn = 27, RTC_IRQn = 30,
+    BURTC_IRQn = 31, VCMP_IRQn = 33, MSC_IRQn = 35, AES_IRQn = 36
 };
 
 static inline void NVIC_EnableIRQ(int irq) { NVIC_ISER[irq >> 5] = 1UL << (irq & 31); }
@@ -133,17 +179,26 @@ static inline void __disable_irq(void) { __asm volatile("cpsid i" ::: "memory");
 #define CMU_OSCENCMD_HFRCODIS (1UL << 1)
 #define CMU_OSCENCMD_LFXOEN (1UL << 8)
 #define CMU_CMD_HFCLKSEL_HFXO 2UL
+#define CMU_OSCENCMD_LFRCOEN (1UL << 6)
+#define CMU_STATUS_LFRCORDY (1UL << 7)
 #define CMU_STATUS_HFXORDY (1UL << 3)
 #define CMU_STATUS_LFXORDY (1UL << 9)
 #define CMU_STATUS_HFXOSEL (1UL << 11)
 #define CMU_HFCORECLKEN0_DMA (1UL << 0)
 #define CMU_HFCORECLKEN0_LE (1UL << 4)
+#define CMU_HFCORECLKEN0_AES (1UL << 1)
+#define CMU_HFPERCLKEN0_ACMP0 (1UL << 9)
+#define CMU_HFPERCLKEN0_ACMP1 (1UL << 10)
+#define CMU_HFPERCLKEN0_VCMP (1UL << 14)
+#define CMU_HFPERCLKEN0_DAC0 (1UL << 17)
 #define CMU_HFPERCLKEN0_UART0 (1UL << 3)
 #define CMU_HFPERCLKEN0_TIMER0 (1UL << 5)
 #define CMU_HFPERCLKEN0_PRS (1UL << 15)
 #define CMU_HFPERCLKEN0_ADC0 (1UL << 16)
 #define CMU_HFPERCLKEN0_I2C0 (1UL << 11)
 #define CMU_HFPERCLKEN0_GPIO (1UL << 13)
+#define CMU_LFACLKEN0_LESENSE (1UL << 0)
+#define CMU_LFBCLKEN0_LEUART0 (1UL << 0)
 #define CMU_LFACLKEN0_RTC (1UL << 1)
 #define CMU_LFACLKEN0_LETIMER0 (1UL << 2)
 

@@ -22,14 +22,16 @@ WEAK(NMI_Handler) WEAK(HardFault_Handler) WEAK(MemManage_Handler) WEAK(BusFault_
 WEAK(UsageFault_Handler) WEAK(SVC_Handler) WEAK(PendSV_Handler) WEAK(SysTick_Handler)
 WEAK(DMA_IRQHandler) WEAK(I2C0_IRQHandler) WEAK(UART0_RX_IRQHandler) WEAK(LETIMER0_IRQHandler)
 WEAK(RTC_IRQHandler) WEAK(BURTC_IRQHandler)
-WEAK(ADC0_IRQHandler)
+WEAK(ADC0_IRQHandler) WEAK(ACMP0_IRQHandler) WEAK(LESENSE_IRQHandler) WEAK(LEUART0_IRQHandler)
+WEAK(PCNT0_IRQHandler) WEAK(VCMP_IRQHandler) WEAK(MSC_IRQHandler) WEAK(AES_IRQHandler)
 
 #define IRQ(unit) [16 + unit##_IRQn] = unit##_IRQHandler
 __attribute__((section(".isr_vector"), used)) void (*const vectors[16 + 39])(void) = {
     (void (*)(void))&__StackTop, Reset_Handler, NMI_Handler, HardFault_Handler, MemManage_Handler,
     BusFault_Handler, UsageFault_Handler, [11] = SVC_Handler, [14] = PendSV_Handler,
     [15] = SysTick_Handler, IRQ(DMA), IRQ(I2C0), IRQ(UART0_RX), IRQ(LETIMER0), IRQ(RTC),
-    IRQ(BURTC), IRQ(ADC0),
+    IRQ(BURTC), IRQ(ADC0), IRQ(ACMP0), IRQ(LESENSE), IRQ(LEUART0), IRQ(PCNT0), IRQ(VCMP), IRQ(MSC),
+    IRQ(AES),
 };
 
 void SystemInit(void) {
