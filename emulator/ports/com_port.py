@@ -73,9 +73,11 @@ class ComPort(PortManager):  # type: ignore[misc]  # pyserial has no types
         suspended: whether the client wants no data and no acknowledgements for now.
     """
 
-    def __init__(self, port: "Settings", write: Callable[[bytes], object]) -> None:
-        """``write`` receives the bytes to send."""
-        self.port = port
+    def __init__(
+        self, port: "Settings", write: Callable[[bytes], object], flush: Callable[[], object]
+    ) -> None:
+        """``write`` receives the bytes to send, ``flush`` sends those that wait."""
+        self.port, self._flush = port, flush
         self.line_mask, self.modem_mask = 0, 0xFF
         self.suspended = False
         self._modem: int | None = None
@@ -165,6 +167,8 @@ class ComPort(PortManager):  # type: ignore[misc]  # pyserial has no types
         self.check_modem_lines(force_notification=True)
 
     def _suspend(self, _value: bytes) -> None:
+        self._send(FLOWCONTROL_SUSPEND, b"")
+        self._flush()  # the last bytes for now
         self.suspended = True
 
     def _resume(self, _value: bytes) -> bytes:
@@ -209,7 +213,7 @@ COMMANDS = {
         "FLOWCONTROL-SUSPEND",
         0,
         ComPort._suspend,
-        "nothing: the client wants silence, and 108 would silence the client",
+        "no value; it is the last until the client resumes",
     ),
     FLOWCONTROL_RESUME: Command("FLOWCONTROL-RESUME", 0, ComPort._resume, "no value"),
     SET_LINESTATE_MASK: Command("SET-LINESTATE-MASK", 1, ComPort._set_line_mask, "the mask"),

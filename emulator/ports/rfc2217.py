@@ -73,7 +73,7 @@ class Rfc2217Endpoint(TcpEndpoint):
             line_state=self._line_state,
             plugged_in=lambda: self._plugged,
         )
-        self._manager = ComPort(settings, self._replies.extend)
+        self._manager = ComPort(settings, self._replies.extend, self._flush)
 
     def _read(self, max_bytes: int) -> bytes:
         manager = self._manager
