@@ -221,7 +221,7 @@ private:
     bool may_fetch(uint32_t pc, uint32_t halves);
     bool fetch(uint32_t pc, uint32_t halves, int64_t &now);
     void fetch_again(Code &code);
-    void fetch_again(uint32_t line);
+    void fetch_again(uint32_t line, uint32_t shift);
     void arrive();
 
     // Execution (execute/loop.cpp, cpu.cpp).
@@ -254,7 +254,9 @@ private:
     // The code that the loop executes: operations[0] is at code_base.
     Operation *operations = nullptr;
     uint32_t code_base = 0, code_size = 0;
-    size_t code_number = 0;            // its place in `codes`
+    // The same of the code found last, while one instruction runs aside.
+    Operation *home = nullptr;
+    uint32_t home_base = 0, home_size = 0;
     Operation aside[3] = {};           // an instruction outside all regions, or at a breakpoint
     FetchLines *lines = nullptr;
     bool guarded = false;              // the MPU checks fetches

@@ -5,39 +5,41 @@
 #include "armv7m/core/cpu.h"
 #include "armv7m/decode/codes.h"
 
+#include <algorithm>
+
 namespace armv7m {
 
 // The fetch of what overlaps a line that lost its words may cost something again.
-inline void Cpu::fetch_again(uint32_t line) {
-    const Code &code = codes[code_number];
-    const uint32_t address = line << lines->shift, offset = address - code.base;
-    if (address >> lines->shift != line || offset >= code.size) return;
-    Operation *op = code.operations.get() + offset / 2;
-    Operation *const end = op + (1u << lines->shift) / 2;
-    for (op -= offset != 0; op != end; op++)
-        if (op->entry > LAST_MARKER) op->entry = C_FETCH;
+inline void Cpu::fetch_again(uint32_t line, uint32_t shift) {
+    static_assert(C_FETCH == LAST_MARKER, "the smaller one of it and of an entry is a marker");
+    const uint32_t address = line << shift, offset = address - home_base;
+    if (address >> shift != line || offset >= home_size) return;
+    Operation *op = home + offset / 2, *const end = op + (1u << shift) / 2;
+    if (offset != 0 && op[-1].halves == 2) op--;    // across the line's begin
+    do op->entry = std::min<uint16_t>(op->entry, C_FETCH);
+    while (++op != end);
 }
 
 // Charges the fetch of an instruction. Returns whether the next fetch of it is free.
-inline bool Cpu::fetch(uint32_t pc, uint32_t halves, int64_t &now) {
-    uint32_t *const tags = lines->tags, shift = lines->shift, mask = lines->mask;
+[[gnu::always_inline]] inline bool Cpu::fetch(uint32_t pc, uint32_t halves, int64_t &now) {
+    FetchLines &from = *lines;
+    uint32_t *const tags = from.tags, shift = from.shift, mask = from.mask;
     const uint32_t first = pc >> shift, last = (pc + 2 * halves - 2) >> shift;
-    for (uint32_t line = first; line <= last; line++) {
-        if (line == fetched) continue;
-        const uint32_t before = tags[line & mask];
-        if (before != line) {
-            const bool sequential = line == fetched + 1;
-            if (lines->reported) {
-                r[15] = pc, cycles = now;
-                now += bus.fetch(line << shift, sequential);
-            } else {
-                now += lines->read(line, sequential, now);
-                tags[line & mask] = line;
-                fetch_again(before);
-            }
+    uint32_t before = fetched;
+    for (uint32_t line = first; line <= last; before = line++) {
+        const uint32_t present = tags[line & mask];
+        if (line == before || line == present) continue;
+        const bool sequential = line == before + 1;
+        if (from.reported) {
+            r[15] = pc, cycles = now, fetched = before;
+            now += bus.fetch(line << shift, sequential);
+        } else {
+            now += from.read(line, sequential, now);
+            tags[line & mask] = line;
+            fetch_again(present, shift);
         }
-        fetched = line;
     }
+    fetched = last;
     return tags[first & mask] == first && tags[last & mask] == last;
 }
 

@@ -256,7 +256,13 @@ narrow_FETCH: {
         FETCHED_BEFORE();
         stays = fetch(PC, op->halves, now);
     }
-    if (stays) op->entry = op->handler();
+    if (stays) {
+        op->entry = op->handler();
+        // So is that of what follows in the same word.
+        Operation *const next = op + op->halves;
+        if (PC_OF(next) & 2 && next->entry == C_FETCH && next->halves == 1)
+            next->entry = next->handler();
+    }
     goto *table[op->handler()];
 }
 narrow_UNDECODED: {

@@ -26,13 +26,23 @@ struct FetchLines {
     uint32_t latest;      // the line that the array read last
     int64_t free;         // the cycle at which that read ended
 
-    // Cycles by which reading this line from the array delays the program.
+    // Cycles by which reading this line from the array delays the program. The branches let the
+    // host go on before it knows `free`.
     uint32_t read(uint32_t line, bool sequential, int64_t now) {
-        int64_t requested = now;
-        if (sequential) requested = line == latest + 1 ? free + 1 : now - ahead;
+        const bool next = sequential && line == latest + 1;
         latest = line;
-        free = std::max(requested + (int64_t)wait, now - 1);
-        return (uint32_t)std::clamp<int64_t>(free - now, 0, wait);
+        if (!next) {
+            const int64_t late = sequential ? (int64_t)wait - ahead : wait;
+            free = now + std::max<int64_t>(late, -1);
+            return (uint32_t)std::max<int64_t>(late, 0);
+        }
+        const int64_t end = free + 1 + wait;
+        if (__builtin_expect(end > now, 0)) {
+            free = end;
+            return (uint32_t)std::min<int64_t>(end - now, wait);
+        }
+        free = std::max(end, now - 1);
+        return 0;
     }
 };
 

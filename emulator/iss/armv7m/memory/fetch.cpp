@@ -25,9 +25,8 @@ bool Cpu::find_code(uint32_t pc) {
         code.base = region->base, code.lines = region->lines;
         fetch_again(code);
     }
-    code_number = (size_t)(&code - codes.data());
-    operations = code.operations.get();
-    code_base = region->base, code_size = region->size;
+    operations = home = code.operations.get();
+    code_base = home_base = region->base, code_size = region->size, home_size = code.size;
     lines = region->lines;
     return true;
 }
