@@ -34,6 +34,7 @@ def unit_quaternion(quaternion: ArrayLike) -> NDArray[np.float64]:
 
 
 def matrix_from_quaternion(quaternion: ArrayLike) -> NDArray[np.float64]:
+    """Rotation (3, 3) from the first axes to the second of a quaternion (4,), scalar last."""
     x, y, z, w = unit_quaternion(quaternion)
     v = np.array([x, y, z])
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])

@@ -22,6 +22,7 @@ from cubestack.firmware_model.values import (
     Declaration,
     DeclaredValues,
     ListDeclaration,
+    TableDeclaration,
     choice,
     described,
     duration,
@@ -35,6 +36,7 @@ from cubestack.firmware_model.values import (
 )
 from cubestack.host.devices.registry import devices
 from cubestack.host.options import Options
+from cubestack.host.studies.powerfail.scenario import Question, Step
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("firmware_model", "emulator", "host")
@@ -47,8 +49,15 @@ NEEDED: dict[str, dict[str, Any]] = {
     "Optics": {one.name: getattr(LENS, one.name) for one in fields(LENS)},
     "CampaignPlan": {"device": "cubestar", "frames": 1},
     "PictureScene": {"file": ROOT / "none.png"},
+    "Pointing": {"quaternion": (0.0, 0.0, 0.0, 1.0)},
     "Pose": SKY,
+    "Question": {"name": "what", "send": "?"},
     "Reflection": {"camera": 0, "alpha_deg": 0, "beta_deg": 0, "radius_px": 1, "level": 1},
+    "Scenario": {
+        "device": "efm32gg",
+        "question": (Question(name="a", send="?"),),
+        "step": (Step(telecommand="SaveConfig"),),
+    },
     "SkyCondition": {"optics": LENS},
     "SkyScene": SKY,
 }
@@ -196,6 +205,8 @@ def beyond(one: Declaration) -> Iterator[float]:
 
 def of_other_kinds(one: Declaration) -> list[Any]:
     """Values of other types; None is one unless it is the default."""
+    if isinstance(one, TableDeclaration):
+        return []  # its keys are declarations of their own
     if one.kind.name not in ("number", "whole", "flag", "text", "choice", "moment"):
         return []
     others: list[Any] = [[], {}, b"1"] + ([] if one.default is None else [None])

@@ -139,8 +139,12 @@ class Scenario(DeclaredValues):
             raise ScenarioError(f"{path}: {error}") from None
 
     def __post_init__(self) -> None:
-        if not self.question or not self.step:
-            raise ScenarioError("needs a [[question]] and a [[step]]")
+        for name, one in self.declared().items():
+            if not isinstance(getattr(self, name), tuple):  # tables, which check themselves
+                self._check(one)
+        for name in ("question", "step"):
+            if not getattr(self, name):
+                raise self.refusal(name, f"must be one [[{name}]] or more")
         names = [one.name for one in self.question]
         if len(set(names)) < len(names):
             raise ScenarioError(f"two questions have the same name: {', '.join(names)}")
