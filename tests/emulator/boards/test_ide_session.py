@@ -11,6 +11,7 @@ import subprocess
 import threading
 from collections.abc import Iterator
 from pathlib import Path
+from time import monotonic
 from typing import NamedTuple
 
 import numpy as np
@@ -29,6 +30,7 @@ GDB = shutil.which("gdb-multiarch")
 pytestmark = [*needs_both_compilers, pytest.mark.skipif(GDB is None, reason="needs gdb-multiarch")]
 
 LIMIT_S = 120  #: Wall time of a session
+AGAIN_S = 20  #: Wall-clock seconds until gdb gets a further Ctrl-C
 PATIENCE_PS = 50 * PS_PER_MS  #: The program runs so long before it is interrupted with Ctrl-C
 
 
@@ -192,6 +194,7 @@ def session(board: OwnFirmwareBoard, folder: Path, more: tuple[Action, ...]) -> 
     reader = threading.Thread(target=lambda: said.extend(program.stdout or ()))
     reader.start()
     resumed_ps: int | None = None
+    again_s = 0.0
     while reader.is_alive():
         if board.kernel.paused or not endpoint.connected:
             resumed_ps = None
@@ -199,9 +202,11 @@ def session(board: OwnFirmwareBoard, folder: Path, more: tuple[Action, ...]) -> 
             continue
         if resumed_ps is None:
             resumed_ps = board.kernel.now
-        if "@@interrupt\n" in said[-3:] and board.kernel.now > resumed_ps + PATIENCE_PS:
+        # A second Ctrl-C soon after the first would disconnect gdb.
+        ready = board.kernel.now > resumed_ps + PATIENCE_PS and monotonic() > again_s
+        if ready and "@@interrupt\n" in said[-3:]:
             program.send_signal(signal.SIGINT)
-            resumed_ps = board.kernel.now  # again, if it was not ready for it
+            again_s = monotonic() + AGAIN_S
         board.kernel.step()
     program.wait(LIMIT_S)
     assert program.stdout is not None
