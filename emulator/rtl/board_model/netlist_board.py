@@ -8,7 +8,7 @@ from cubestack.hdl.devboard.netlist import board_header, mutate, read_netlist
 
 
 def netlist_board(folder: Path, mutant: str = "", seed: int = 0) -> tuple[SimulatedBoard, str]:
-    """The simulated board of the build in ``folder``, and what is wrong with it; see below."""
+    """The simulated board of the build in ``folder``, and its fault: see `netlist_boards`."""
     header, divider, fault = _netlist(folder, mutant, seed)
     return SimulatedBoard(header, divider), fault
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from typing import Any
 
 import numpy as np
@@ -73,8 +74,9 @@ class EmulatedSensor(sysModel.SysModel):
     #: whether its scene has the Earth
     _sees_earth = True
 
+    @abstractmethod
     def _write(self, value: NDArray[np.float64] | None, time_ns: int, now_ns: int) -> None:
-        raise NotImplementedError
+        """Send the message of a measurement, with its time; None: there is no fix."""
 
 
 class StarTracker(EmulatedSensor):

@@ -40,7 +40,7 @@ examples:
 SIMULATE = """Run the placed netlist of a build behind a pseudo-terminal, in place of a board
 with its bitstream. Prints the port, and runs until it is interrupted. For a
 quick simulation build with a high --baud, at most half of the bridge's clock.
-Up to 64 boards side by side take as long as one.
+Up to 64 boards side by side take little longer than one.
 
 examples:
   cubestack hdl board icebreaker --top TOP --baud 6000000 --out out/board

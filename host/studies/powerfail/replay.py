@@ -74,7 +74,7 @@ class Gdb(Witness):
 def replay(setup: Setup, course: Course, name: str, witness: Witness) -> Row:
     """Run a case again; ``name`` is its number, behind a dot that of its second cut.
 
-    Raises ValueError for a case that there is not.
+    Raises ValueError for an unknown case.
     """
     case, number = _case(setup, course, name)
     tester = Tester(setup, course, fresh_rig(setup))

@@ -1,6 +1,6 @@
 """Whole devices on placed netlists behind pseudo-terminals: the compiled engine's bytes.
 
-BOARD_WHOLE=1 runs it: about half an hour on two idle cores.
+BOARD_WHOLE=1 runs it: about half an hour on a busy machine.
 """
 
 import multiprocessing
@@ -49,7 +49,7 @@ def fault(kind: str, engine: str) -> object:
 
 
 def conformance(name: str, engine: str) -> object:
-    """With writes for one camera: two that store at once take an hour."""
+    """With writes for one camera: two that store at once cost a request for each clock."""
     target = open_target(f"emulated:{name}", engine=engine)
     try:
         checks = run_suite(target, allow_write=name == "cubestar").checks
