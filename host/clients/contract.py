@@ -248,6 +248,20 @@ class DeviceClient(Closable):
         """
         raise TargetError(f"{self.client.interface.name} is no star tracker")
 
+    def observe(self) -> None:
+        """Capture an image with each camera and process it; ``latest`` has the result.
+
+        Raises TargetError for a device without images, and the client's errors.
+        """
+        raise TargetError(f"{self.client.interface.name} takes no images")
+
+    def summary(self, latest: Columns) -> str:
+        """The latest result in a sentence: what was found, and how well it is known.
+
+        ``latest`` is what that method returned. Raises the client's errors.
+        """
+        return ", ".join(f"{name} {value}" for name, value in latest.items() if value is not None)
+
     def latest(self) -> Columns:
         """The latest result for a log; invalid angles are None.
 

@@ -12,11 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.interface.codec.attitude_quality import read_covariance
+from cubestack.firmware_model.interface.codec.attitude_quality import UNKNOWN_RAD, read_covariance
 from cubestack.firmware_model.interface.codec.field import Value
 from cubestack.host.errors import BadAnswerError
 
 LENGTH_TOLERANCE = 0.01
+
+ARCSEC_PER_DEG = 3600
 
 
 def unit_quaternion(values: Mapping[str, Value], prefix: str = "Q") -> NDArray[np.float64]:
@@ -80,6 +82,21 @@ class AttitudeQuality:
     def sigmas_rad(self) -> NDArray[np.float64]:
         """Standard deviations (3,) about the camera's x, y and z."""
         return np.asarray(np.sqrt(np.diag(self.covariance)))
+
+
+def described(detected: int, identified: int, quality: AttitudeQuality) -> str:
+    """Stars and attitude of an image in a sentence; without a rating, no accuracy."""
+    across = max(quality.sigmas_rad[:2])
+    known = across < UNKNOWN_RAD
+    accuracy = (
+        f"known to {math.degrees(across) * ARCSEC_PER_DEG:.2g} arcsec" if known else "measured"
+    )
+    return f"{identified} of {detected} stars identified, attitude {accuracy}"
+
+
+def words(code: IntEnum) -> str:
+    """The name of a code as words."""
+    return code.name.lower().replace("_", " ")
 
 
 def common(values: Mapping[str, Value]) -> dict[str, Any]:

@@ -47,6 +47,11 @@ class Emulation:
 
     def __post_init__(self) -> None:
         self._snapshots: dict[str, int] = {}
+        self._at_start = {
+            (one.device.name, name): crc32(picture.tobytes())
+            for one in self.emulated
+            for name, picture in one.board.pictures().items()
+        }
         self._reset_views()
 
     def _reset_views(self) -> None:
@@ -107,7 +112,10 @@ class Emulation:
         return {"log": lines[max(0, since) :], "count": len(lines)}
 
     def pictures(self, device: str) -> JsonObject:
-        """Images in its memories, and when a change of each was first detected."""
+        """Images in its memories, when a change of each was first detected, and if one is there.
+
+        ``stored`` is false for what a memory holds at power-up.
+        """
         found = {}
         for name, picture in self.of(device).board.pictures().items():
             key, known = (device, name), crc32(picture.tobytes())
@@ -115,7 +123,10 @@ class Emulation:
                 self._checksums[key] = known
                 self._changed_s[key] = self.port.kernel.now / PS_PER_S
             rows, columns = picture.shape
-            found[name] = {"rows": rows, "columns": columns, "changed_s": self._changed_s[key]}
+            found[name] = {
+                **{"rows": rows, "columns": columns, "changed_s": self._changed_s[key]},
+                "stored": known != self._at_start[key],
+            }
         return {"pictures": found}
 
     def picture(self, device: str, name: str) -> NDArray[np.uint8]:

@@ -96,6 +96,7 @@ def page_app(sessions: "Sequence[Future[TargetSession]]") -> Starlette:
             get("scene/keys", forward("GET", "{device}/scene/keys")),
             post("scene/look", forward("POST", "{device}/scene/look")),
             get("stars", forward("GET", "/stars")),
+            post("observe", _observe),
             post("restart", _restart),
             post("{call:str}", relays.control_time),
             WebSocketRoute(f"{TARGET}/live", live),
@@ -125,6 +126,10 @@ async def _shell(session: TargetSession, body: JsonObject, _path: JsonObject) ->
     if not isinstance(line, str):
         raise ValueError("'line' must be a line of the shell")
     return await asyncio.wrap_future(session.execute(line))
+
+
+async def _observe(session: TargetSession, _body: JsonObject, _path: JsonObject) -> JsonObject:
+    return await asyncio.wrap_future(session.observe())
 
 
 async def _restart(session: TargetSession, body: JsonObject, _path: JsonObject) -> JsonObject:
@@ -244,6 +249,7 @@ async def _live(session: TargetSession, socket: WebSocket) -> None:
                 update["values"] = await asyncio.wrap_future(session.read(subscription.show))
             if subscription.results and free:
                 update["results"] = await asyncio.wrap_future(session.results())
+                update["summary"] = session.summary
                 session.log.add(update["results"], update.get("emulation", {}).get("truth", {}))
             update["results_logged"] = session.log.count
             await socket.send_json(update)

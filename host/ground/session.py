@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, TypeVar
 
 from cubestack.firmware_model.interface.codec.message import Message
@@ -56,6 +56,7 @@ class TargetSession:
     link: state of the link to it.
     transfer: the latest image transfer; None before the first one.
     restarts: number of restarts of its emulation.
+    summary: the latest result in words; empty before the first.
     log: results that were read.
     """
 
@@ -64,6 +65,8 @@ class TargetSession:
         self.target, self.link, self._emulator = target, LinkState(), emulator
         self.transfer: Transfer | None = None
         self.restarts = 0
+        self.summary = ""
+        self._described: Columns | None = None
         self.log = ResultLog()
         self._shell = Shell(target)
         self._thread = ThreadPoolExecutor(1, "target")
@@ -108,13 +111,14 @@ class TargetSession:
             missing["detections"] = f"{name} does not report what it detected"
         for what, method, reason in (
             ("results", "latest", "has no results to log"),
+            ("observe", "observe", "takes no images"),
             ("download", "picture", "sends no image"),
             ("upload", "upload", "has no image upload"),
         ):
             if not self._implements(method):
                 missing[what] = f"{name} {reason}"
         if self.playback is not None:
-            for what in ("send", "download", "upload", "detections", "sensor_registers"):
+            for what in ("send", "observe", "download", "upload", "detections", "sensor_registers"):
                 missing[what] = f"{target.name} is a recording, which accepts no telecommands"
         if target.registers is None:
             missing["registers"] = f"no registers of {name} can be reached here"
@@ -170,6 +174,15 @@ class TargetSession:
     def results(self) -> "Future[JsonObject]":
         """Its latest result by column name, or ``error``."""
         return self._thread.submit(self._results)
+
+    def observe(self) -> "Future[JsonObject]":
+        """Have it capture and process an image; ``rows`` have the result in words.
+
+        Raises ValueError if it takes none or a transfer runs.
+        """
+        self._require("observe")
+        self._require_no_transfer()
+        return self._request(self._observe)
 
     def start_transfer(
         self, what: str, source: str | None = None, content: bytes = b""
@@ -228,6 +241,7 @@ class TargetSession:
         before = self.target
         self.target, end = emulator.restart(before, options, files)
         self._shell, self.link, self.transfer = Shell(self.target), LinkState(), None
+        self.summary, self._described = "", None
         self.restarts += 1  # before ``about`` is computed again
         for name in ("about", "_client"):
             vars(self).pop(name, None)
@@ -271,9 +285,21 @@ class TargetSession:
             raise ValueError(self.about["missing"]["sensor_registers"])
         return read_sensor_register(self.target.device, self.target.node, name)
 
+    def _observe(self) -> JsonObject:
+        assert self._client is not None
+        self._shell.asked(self._client.observe)
+        self._results()
+        return {"rows": [["", self.summary]]}
+
     def _results(self) -> JsonObject:
+        if self._client is None:
+            return {}
         try:
-            return {} if self._client is None else dict(self._tracked(self._latest))
+            results = self._tracked(self._latest)
+            if results != self._described:
+                self.summary = self._tracked(partial(self._client.summary, results))
+                self._described = results
+            return dict(results)
         except (HostError, ValueError) as error:
             return {"error": str(error)}
 
@@ -317,6 +343,14 @@ class TargetSession:
 
 
 def _message(one: Message) -> JsonObject:
-    fields = [{**field_json(f), "details": field_details(f)} for f in one.fields]
+    fields = [
+        {
+            **field_json(f),
+            "details": field_details(f),
+            "group": f.group,
+            "severity": f.severity.name.lower(),
+        }
+        for f in one.fields
+    ]
     about = picked(one, "id", "name", "meaning", "supported", "extension")
-    return about | {"changes": one.has_side_effect, "fields": fields}
+    return about | {"risk": one.risk, "changes": one.has_side_effect, "fields": fields}

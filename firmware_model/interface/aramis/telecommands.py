@@ -51,7 +51,12 @@ def _components(meaning: str) -> tuple[Field, ...]:
 
 _USE_CASES = (
     Message(1, "Activate", "start the camera, load the catalogue, be ready to measure"),
-    Message(2, "Deactivate", "stop the loop and the camera; settings stay"),
+    Message(
+        2,
+        "Deactivate",
+        "stop the loop and the camera; settings stay",
+        risk="measurements stop, and the camera is off",
+    ),
     Message(3, "SetSystemTime", "set the clock to the time at which the telecommand arrived").of(
         u32("JulianDay", "whole Julian days, which begin at noon UT", "d"),
         u32("Millisecond", "since that noon", "ms", high=MS_PER_DAY - 1),
@@ -77,6 +82,7 @@ _USE_CASES = (
         7,
         "LatchUpAction",
         "turn the camera unit's supply off or on; off ends a latch-up, on sets the camera up again",
+        risk="the supply of the camera unit changes",
     ).of(enum8("Step", "off, then on", choices=LatchUpStep, reset=LatchUpStep.ON)),
     Message(8, "BeginCatalogue", "begin an upload; CommitCatalogue replaces the catalogue").of(
         u32("Length", "of the catalogue's image", "bytes", reset=1).within(
@@ -88,7 +94,12 @@ _USE_CASES = (
         u16("BlockNumber", "block n covers bytes 128 n to 128 n + 127"),
         byte_array(BLOCK_BYTES, "Data", "bytes; those beyond the length are ignored"),
     ),
-    Message(10, "CommitCatalogue", "check the upload, write it to flash error-coded, and use it"),
+    Message(
+        10,
+        "CommitCatalogue",
+        "check the upload, write it to flash error-coded, and use it",
+        risk="the catalogue in flash is replaced",
+    ),
     Message(
         11,
         "SetBodyRotation",
@@ -134,10 +145,25 @@ _EXTENSIONS = (
         u16("Period", "0: only if it is damaged", "s", reset=60)
     ),
     Message(108, "ReloadCatalogue", "load the catalogue from flash now"),
-    Message(109, "RefreshCatalogue", "load the catalogue and rewrite it to flash without errors"),
-    Message(110, "SaveConfig", "write all settings to flash"),
-    Message(111, "ClearConfig", "erase the settings in flash, return to the reset values"),
-    Message(112, "Reset", "restart the program, inactive"),
+    Message(
+        109,
+        "RefreshCatalogue",
+        "load the catalogue and rewrite it to flash without errors",
+        risk="the catalogue in flash is rewritten",
+    ),
+    Message(
+        110,
+        "SaveConfig",
+        "write all settings to flash",
+        risk="the settings stored before are replaced",
+    ),
+    Message(
+        111,
+        "ClearConfig",
+        "erase the settings in flash, return to the reset values",
+        risk="the stored settings are erased",
+    ),
+    Message(112, "Reset", "restart the program, inactive", risk="the program restarts, inactive"),
     Message(113, "ClearErrorFlags", "clear all flags of telemetry ErrorFlags"),
     Message(114, "ImageBlockSet", "select the block that telemetry ImageBlock returns").of(
         u16("BlockNumber", "of the latest image", high=IMAGE_BYTES // BLOCK_BYTES - 1)

@@ -15,6 +15,8 @@ from cubestack.firmware_model.interface.aramis.telecommands import (
 from cubestack.firmware_model.interface.codec.attitude_quality import ATTITUDE_QUALITY
 from cubestack.firmware_model.interface.codec.field import (
     Field,
+    Flag,
+    Severity,
     byte_array,
     enum8,
     f32,
@@ -53,11 +55,34 @@ _FLAGS = {
     "ConfigError": (29, "settings in flash were damaged; reset values are in use"),
 }
 
+_GROUPS = {
+    0: "UART",
+    3: "I2C",
+    4: "requests",
+    12: "loop",
+    16: "camera",
+    24: "catalogue",
+    29: "flash",
+}
+"""What the flags from a bit on are about."""
+
+_FAULTS = {
+    *("CameraSilent", "CameraTimeout", "CameraFrameError"),
+    *("CatalogueMissing", "CatalogueDamaged", "RamError", "ConfigError"),
+}
+
 FLAG_NAMES = frozenset(_FLAGS)
 
 
 def flag_fields() -> tuple[Field, ...]:
-    return flags_at((bit, name, cause, name) for name, (bit, cause) in _FLAGS.items())
+    return flags_at(
+        Flag(bit, name, cause, _group(bit), Severity.FAULT if name in _FAULTS else Severity.NOTICE)
+        for name, (bit, cause) in _FLAGS.items()
+    )
+
+
+def _group(bit: int) -> str:
+    return next(_GROUPS[first] for first in reversed(_GROUPS) if first <= bit)
 
 
 #: Steps of a measurement, in the order of telemetry PhaseTimes, with their meanings.

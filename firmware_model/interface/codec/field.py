@@ -18,7 +18,7 @@ from collections.abc import Iterable, Mapping
 from copy import copy
 from dataclasses import KW_ONLY, dataclass, field, replace
 from difflib import get_close_matches
-from enum import IntEnum
+from enum import Enum, IntEnum
 from functools import partial
 from typing import Self, SupportsFloat
 
@@ -59,6 +59,35 @@ def _round_half_away(value: float) -> int:
     return int(math.copysign(whole + (magnitude - whole >= 0.5), value))
 
 
+class Severity(Enum):
+    """How an operator rates a flag that is set."""
+
+    STATE = "a state, no problem"
+    NOTICE = "something was refused, lost or cut short; the node works on"
+    FAULT = "a part failed, or does not do what it should"
+
+
+@dataclass(frozen=True)
+class Flag:
+    """An error flag in a block of flags.
+
+    Attributes:
+        bit: in the block.
+        name: in this frame.
+        meaning: its cause.
+        group: what it is about, a word or two.
+        severity: how an operator rates it.
+        shows: the flag's own name, if this frame prints another one.
+    """
+
+    bit: int
+    name: str
+    meaning: str
+    group: str
+    severity: Severity = Severity.NOTICE
+    shows: str = ""
+
+
 @dataclass(frozen=True)
 class Field(Declaration):
     """A field of a message; u8, u16, ... below make one of their type.
@@ -73,6 +102,8 @@ class Field(Declaration):
         choices_by: (other field, {its value: the choices that go with it}), or None.
         range_flag: error flag that a value outside these limits raises, or empty.
         flag: for a bool1 that shows an error flag: that flag's name.
+        group: what that flag is about, a word or two.
+        severity: how an operator rates a bool1 that is set.
         counter: whether it counts events, so that two equal devices may show other values.
         reset: value after power-up; None takes zero.
         gap: unused bits between the field before and this one.
@@ -91,6 +122,8 @@ class Field(Declaration):
     choices_by: tuple[str, Mapping[int, Choices]] | None = None
     range_flag: str = ""
     flag: str = ""
+    group: str = ""
+    severity: Severity = Severity.STATE
     counter: bool = False
     reset: Value | None = None
     gap: int = 0
@@ -251,13 +284,11 @@ def byte_array(count: int, name: str, meaning: str) -> Field:
     return Field(name, meaning, type=f"bytes{count}")
 
 
-def flags_at(flags: Iterable[tuple[int, str, str, str]]) -> tuple[Field, ...]:
-    """A block of bool1 that show error flags: bit in the block, name, meaning, flag's name.
-
-    The bits ascend; those between are unused.
-    """
+def flags_at(flags: Iterable[Flag]) -> tuple[Field, ...]:
+    """A block of bool1 that show error flags, by ascending bits; those between are unused."""
     fields, end = [], 0
-    for bit, name, meaning, flag in flags:
-        fields.append(bool1(name, meaning, flag=flag, gap=bit - end))
-        end = bit + 1
+    for one in flags:
+        field = bool1(one.name, one.meaning, flag=one.shows or one.name, gap=one.bit - end)
+        fields.append(replace(field, group=one.group, severity=one.severity))
+        end = one.bit + 1
     return tuple(fields)

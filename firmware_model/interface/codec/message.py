@@ -53,6 +53,7 @@ class Message:
         fields: in order of their offsets, without gaps.
         ordered: pairs of field names; the first value must not exceed the second.
         extension: added by this project to the published interface.
+        risk: what a telecommand interrupts or erases; hosts ask before they send it.
         steps: each read returns the next of several records, and wraps.
         starts_measurement: a read makes the node measure again.
         supported: False if the node rejects the ID as unknown.
@@ -66,6 +67,7 @@ class Message:
     fields: tuple[Field, ...] = ()
     ordered: tuple[tuple[str, str], ...] = ()
     extension: bool = False
+    risk: str = ""
     steps: bool = False
     starts_measurement: bool = False
     supported: bool = True

@@ -8,7 +8,7 @@ from enum import IntEnum
 from types import MappingProxyType
 from typing import Any
 
-from cubestack.firmware_model.interface.codec.field import enum8, flags_at, u8, u16
+from cubestack.firmware_model.interface.codec.field import Flag, enum8, flags_at, u8, u16
 from cubestack.firmware_model.interface.codec.message import Interface, Message
 
 
@@ -47,7 +47,7 @@ TCMD_PROCESSED = Message(131, "TcmdProcessed", "pending telecommands and latest 
 )
 
 NODE_TELECOMMANDS = (
-    Message(1, "Reset", "restart the program"),
+    Message(1, "Reset", "restart the program", risk="the program restarts"),
     Message(2, "ClearErrorFlags", "lower all error flags"),
 )
 
@@ -60,7 +60,10 @@ def node_telemetry(node_type: int, own_flags: Mapping[str, str]) -> tuple[Messag
             u8("NodeType", f"always {node_type}", reset=node_type), *IDENTIFICATION.fields[1:]
         ),
         Message(130, "ErrorFlags", "errors since ClearErrorFlags").of(
-            *flags_at((bit, name, flags[name], name) for bit, name in enumerate(flags))
+            *flags_at(
+                Flag(bit, name, flags[name], "link" if name in NODE_FLAGS else "node")
+                for bit, name in enumerate(flags)
+            )
         ),
         TCMD_PROCESSED,
     )

@@ -91,7 +91,7 @@ def _coefficients() -> Iterator[Field]:
 
 
 _COMMON = (
-    _high(0, "Reset", "restart a part of the node").of(
+    _high(0, "Reset", "restart a part of the node", risk="that part restarts").of(
         u8("Target", "part", choices=codes.ResetTarget, reset=codes.ResetTarget.COMMUNICATION)
     ),
     _low(

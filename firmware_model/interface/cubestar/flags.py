@@ -7,12 +7,17 @@ here. Some flags belong to hardware that this node lacks, or that does not fail 
 
 from dataclasses import dataclass
 
-from cubestack.firmware_model.interface.codec.field import Field, flags_at
+from cubestack.firmware_model.interface.codec.field import Field, Flag, Severity, flags_at
 
 
 @dataclass(frozen=True)
 class ErrorFlag:
-    """A flag; ``log_name`` if LogStatus has another name; ``never``: why it is never raised."""
+    """A flag of a node.
+
+    Attributes:
+        log_name: its name in LogStatus, if that differs.
+        never: why it is never raised.
+    """
 
     bit: int
     name: str
@@ -20,6 +25,24 @@ class ErrorFlag:
     log_name: str = ""
     never: str = ""
 
+
+_GROUPS = {
+    0: "supply",
+    8: "UART",
+    16: "I2C",
+    24: "image",
+    32: "settings",
+    40: "requests",
+    48: "detection",
+    56: "identification",
+    72: "flash",
+}
+"""What the flags from a bit on are about."""
+
+_FAULTS = {"supply", "image", "flash"}
+"""Groups whose flags are faults of hardware, unless a request caused them."""
+
+_REQUESTED = {"StatusError", "TestPatternConfigError"}
 
 _FLAGS = (
     ErrorFlag(0, "OverCurrent", "a supply current was above its limit and the switch was opened"),
@@ -88,11 +111,18 @@ NEVER_RAISED = {flag.name: flag.never for flag in _FLAGS if flag.never}
 def flag_fields(*, log_names: bool = False) -> tuple[Field, ...]:
     """Fields of the block of flags, with LogStatus' names if ``log_names``."""
     return flags_at(
-        (
+        Flag(
             flag.bit,
             flag.log_name if log_names and flag.log_name else flag.name,
             f"{flag.cause} (not on this node: {flag.never})" if flag.never else flag.cause,
+            group := next(_GROUPS[bit] for bit in reversed(_GROUPS) if bit <= flag.bit),
+            _severity(flag.name, group),
             flag.name,
         )
         for flag in _FLAGS
     )
+
+
+def _severity(name: str, group: str) -> Severity:
+    is_fault = group in _FAULTS and name not in _REQUESTED
+    return Severity.FAULT if is_fault else Severity.NOTICE

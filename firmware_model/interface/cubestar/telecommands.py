@@ -32,9 +32,24 @@ def _edge(name: str, meaning: str, maximum: int, reset: int) -> Field:
 
 
 _SYSTEM = (
-    Message(1, "TogglePowerSW", "toggle the load switch of the imager and the frame buffer"),
-    Message(2, "Reset", "restart the program; settings and counters return to power-up values"),
-    Message(3, "MCUReset", "reset the microcontroller by its system-request reset"),
+    Message(
+        1,
+        "TogglePowerSW",
+        "toggle the load switch of the imager and the frame buffer",
+        risk="the supply of imager and frame buffer changes",
+    ),
+    Message(
+        2,
+        "Reset",
+        "restart the program; settings and counters return to power-up values",
+        risk="the program restarts; settings that are not stored are lost",
+    ),
+    Message(
+        3,
+        "MCUReset",
+        "reset the microcontroller by its system-request reset",
+        risk="the microcontroller restarts; settings that are not stored are lost",
+    ),
     Message(4, "setDelayTimerTimeout", "delay between Trigger and the first capture").of(
         u8("Time", "delay", "x 10 ms", reset=1).within(1, 100, "DelayTimeSetToLong")
     ),
@@ -109,7 +124,12 @@ _IMAGE = (
         )
     ),
     Message(16, "CaptureImage", "capture an image and transfer it to the processor"),
-    Message(17, "UploadImage", "begin an upload: clear the image memory; UploadBlock fills it"),
+    Message(
+        17,
+        "UploadImage",
+        "begin an upload: clear the image memory; UploadBlock fills it",
+        risk="the image in memory is lost",
+    ),
     Message(18, "ImageBlockSet", "select the block that telemetry ImageBlock returns").of(
         u16(
             "BlockNumber",
@@ -205,10 +225,30 @@ _IDENTIFICATION = (
 
 _OPERATION = (
     Message(31, "ReadConfig", "restore the settings that SaveConfig stored"),
-    Message(32, "SaveConfig", "store the settings in flash"),
-    Message(33, "ClearConfig", "erase the stored settings and return to the reset values"),
-    Message(34, "TestSRAM", "test the image memory; the image is lost"),
-    Message(35, "TestWDG", "stop serving the watchdog, so that it resets the processor"),
+    Message(
+        32,
+        "SaveConfig",
+        "store the settings in flash",
+        risk="the settings stored before are replaced",
+    ),
+    Message(
+        33,
+        "ClearConfig",
+        "erase the stored settings and return to the reset values",
+        risk="the stored settings are erased",
+    ),
+    Message(
+        34,
+        "TestSRAM",
+        "test the image memory; the image is lost",
+        risk="the image in memory is lost",
+    ),
+    Message(
+        35,
+        "TestWDG",
+        "stop serving the watchdog, so that it resets the processor",
+        risk="the watchdog resets the microcontroller",
+    ),
     Message(36, "CaptureAndProcess", "capture an image, then detect, identify and estimate"),
     Message(37, "ProcessImage", "detect, identify and estimate with the image in memory"),
     Message(38, "Trigger", "start the 1 s loop; it runs until StopLoop or Reset"),

@@ -21,7 +21,9 @@ from cubestack.host.clients.quaternions import (
     AttitudeQuality,
     attitude_columns,
     common,
+    described,
     unit_quaternion,
+    words,
 )
 from cubestack.host.errors import StepFailedError, TargetError
 
@@ -161,6 +163,19 @@ class Aramis(DeviceClient):
             "detected": found.detected,
             "matched": found.matched,
         }
+
+    def observe(self) -> None:
+        """As ``take_picture`` does."""
+        self.take_picture()
+
+    def summary(self, latest: Columns) -> str:
+        """Stars of the latest image, and its attitude or why there is none."""
+        attitude = self.attitude()
+        if attitude.outcome is aramis.MeasurementOutcome.NOT_MEASURED:
+            return "no image since power-up"
+        if attitude.valid:
+            return described(attitude.detected, attitude.matched, self.quality())
+        return f"{attitude.detected} stars detected, no attitude: {words(attitude.reason)}"
 
     def body_quaternion(self) -> NDArray[np.float64] | None:
         """The latest attitude of the spacecraft (4,), inertial to body; None before the first."""

@@ -154,6 +154,15 @@ class CubeSense(DeviceClient):
             }
         return columns
 
+    def observe(self) -> None:
+        """Capture with the Sun camera, then with the nadir camera, and detect in both images."""
+        for camera in Camera:
+            self.capture_and_detect(camera)
+
+    def summary(self, latest: Columns) -> str:
+        """Of each camera: the direction, or why there is none."""
+        return "; ".join(_described(camera, latest) for camera in Camera)
+
     def result_then_schedule(self, camera: Camera, sram: Sram | None = None) -> Measurement:
         """A camera's latest measurement; reading it starts the next one, into ``sram``."""
         wanted = (camera, _own(camera, sram))
@@ -330,6 +339,20 @@ class CubeSense(DeviceClient):
             f"after {CAPTURE_TIMEOUT_S:g} s",
             POLL_PERIOD_S,
         )
+
+
+def _described(camera: Camera, latest: Columns) -> str:
+    name, title = camera.name.lower(), camera.name.capitalize()
+    alpha, beta = latest[f"{name}_alpha_deg"], latest[f"{name}_beta_deg"]
+    if alpha is not None and beta is not None:
+        right, down = float(alpha), float(beta)
+        sides = "left" if right < 0 else "right", "up" if down < 0 else "down"
+        return f"{title} {abs(right):.2f} deg {sides[0]}, {abs(down):.2f} deg {sides[1]}"
+    capture, detect = (str(latest[f"{name}_{step}"]) for step in ("capture", "detect"))
+    if capture == CaptureResult.START_UP.name:
+        return f"{title}: no image since power-up"
+    why = detect if CaptureResult[capture].stored else capture
+    return f"{title} not found: {why.lower().replace('_', ' ')}"
 
 
 def _own(camera: Camera, sram: Sram | None) -> Sram:

@@ -24,8 +24,10 @@ from cubestack.host.clients.quaternions import (
     AttitudeQuality,
     attitude_columns,
     common,
+    described,
     pointing_deg,
     unit_quaternion,
+    words,
 )
 from cubestack.host.errors import BadAnswerError, StepFailedError
 
@@ -117,6 +119,10 @@ class CubeStar(DeviceClient):
         """Detect, identify and estimate with the image in memory; returns the last step reached."""
         self.perform("ProcessImage")
         return self.task_status()
+
+    def observe(self) -> None:
+        """As ``capture_and_process`` does."""
+        self.capture_and_process()
 
     def task_status(self) -> TaskStatus:
         """The node's last task; raises BadAnswerError for an unknown status."""
@@ -221,6 +227,19 @@ class CubeStar(DeviceClient):
             "matched": found.matched,
             "task": self.task_status().name,
         }
+
+    def summary(self, latest: Columns) -> str:
+        """Stars of the latest image, and its attitude or why there is none."""
+        if not latest["frame"]:
+            return "no image since power-up"
+        detected = int(self.client.telemetry("DetectionSummary")["NumStarsDetected"])
+        quality = self.quality()
+        if latest["valid"]:
+            identified = int(self.client.telemetry("NumIdStars")["numIdStars"])
+            return described(detected, identified, quality)
+        rated = quality.reason is not Reason.NOT_RATED
+        why = words(quality.reason if rated else self.task_status())
+        return f"{detected} stars detected, no attitude: {why}"
 
     def coarse_quaternion(self) -> NDArray[np.float64]:
         """The latest quaternion (4,) of the published telemetry, in steps of 1e-4.

@@ -11,7 +11,7 @@ from itertools import chain
 
 import numpy as np
 
-from cubestack.firmware_model.interface.codec.field import Field
+from cubestack.firmware_model.interface.codec.field import Field, Severity
 from cubestack.firmware_model.interface.codec.message import Interface, Message, MessageKind
 from cubestack.host.export.answers import answers, requested
 from cubestack.host.export.field_text import field_details
@@ -20,6 +20,9 @@ TYPES = {"bool1": "UINT", "u8": "UINT", "u16": "UINT", "u32": "UINT", "enum8": "
 TYPES |= {"i16": "INT", "f32": "FLOAT"}
 
 ID_BITS = 8
+
+_COLOURS = {Severity.STATE: "GREEN", Severity.NOTICE: "YELLOW", Severity.FAULT: "RED"}
+"""Of flags that are set."""
 
 #: Of the ID in a plug-in's packets; a field may be called ID.
 ID_NAME = "PACKET_ID"
@@ -63,6 +66,8 @@ def _request(interface: Interface, message: Message, id_name: str) -> Iterator[s
 
 def _command(interface: Interface, message: Message, id_name: str) -> Iterator[str]:
     yield _packet("COMMAND", interface, message.name, message.meaning)
+    if message.risk:
+        yield f"  HAZARDOUS {_quoted(message.risk)}"
     yield _id_parameter(message, id_name)
     for field in message.fields:
         details = f"{_quoted(field_details(field))} {_endian(field)}"
@@ -87,7 +92,7 @@ def _answer(interface: Interface, message: Message) -> Iterator[str]:
         yield from _item(field, ID_BITS)
         if field.flag:
             yield "    STATE FALSE 0 GREEN"
-            yield "    STATE TRUE 1 RED"
+            yield f"    STATE TRUE 1 {_COLOURS[field.severity]}"
         elif field.choices is interface.ack_errors:
             for choice in interface.ack_errors:
                 yield f"    STATE {choice.name} {int(choice)} {'RED' if choice else 'GREEN'}"

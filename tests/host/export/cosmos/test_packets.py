@@ -79,6 +79,8 @@ def parse(text: str) -> Packets:
             assert name not in items
             little = {"LITTLE_ENDIAN": True, "BIG_ENDIAN": False}[endianness]
             item = items[name] = Item(name, int(bit), int(bits), kind, little, numbers)
+        elif keyword == "HAZARDOUS":
+            assert len(rest) == 1
         else:
             assert len(rest) in MODIFIERS[keyword]
             item.modifiers.setdefault(keyword, []).append(rest)
@@ -125,6 +127,19 @@ def test_exported_commands_encode_the_values_the_node_decodes(interface: Interfa
                     if one.also is None:
                         assert low >= one.raw_range[0] / one.scale - 1e-9
                         assert one.ends[0] is None or low == pytest.approx(one.low)
+
+
+@EACH
+def test_risky_commands_are_hazardous(interface: Interface) -> None:
+    lines = cosmos(interface).splitlines()
+    marked = {
+        lines[number - 1].split()[2]: shlex.split(line)[1]
+        for number, line in enumerate(lines)
+        if line.startswith("  HAZARDOUS ")
+    }
+    risks = {one.name.upper(): one.risk for one in interface.telecommands if one.risk}
+    assert marked == risks
+    assert risks
 
 
 SIGNED = i16("Angle", "an angle", "deg", 100).within(-90, 90)
