@@ -11,7 +11,7 @@ BEFORE, KNOWN = "no image since power-up", r"attitude known to ([0-9.e-]+) arcse
 
 
 @pytest.mark.parametrize("name", device_names())
-def test_operator_gets_an_image_with_its_result_in_words(name: str) -> None:
+def test_observe_then_summary_describes_the_image(name: str) -> None:
     with open_device(name, seed=3, profile="extended") as device:
         client = device.client
         assert BEFORE in client.summary(client.latest())
@@ -25,14 +25,14 @@ def test_operator_gets_an_image_with_its_result_in_words(name: str) -> None:
             return
         (truth,) = device.board.truths().values()
         found = np.array([latest[f"q{part}"] for part in range(4)], np.float64)
-        # About the boresight, the error is many times the one that is told.
+        # About the boresight, the error is many times that of the boresight.
         error_rad = 2 * math.acos(min(abs(float(truth @ found)), 1))
         assert error_rad < math.radians(60 * float(known[1]) / 3600)
         assert re.match(r"[1-9][0-9]* of [0-9]+ stars identified, ", told)
 
 
-def test_operator_is_told_why_there_is_no_attitude() -> None:
-    with open_device("cubestar", profile="extended") as device:
+def test_summary_says_why_there_is_no_attitude() -> None:
+    with open_device("cubestar", profile="published") as device:
         device.client.perform("setDetectionThresholds", DetectionThreshold=255, StarThreshold=255)
         device.client.observe()
         told = device.client.summary(device.client.latest())
