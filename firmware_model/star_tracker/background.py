@@ -13,6 +13,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.firmware_model.mcu.inner_loops import BYTES, FLOAT, INT, INTS, MARKS, Loop
+
 CELL = 32  #: width of a cell in px
 UNIT = 16  #: parts of a DN that levels are kept in
 BLOCK = 8  #: pixels of a row that share a threshold
@@ -25,6 +27,9 @@ _QUARTILE_MEAN = 0.728
 
 Ints = NDArray[np.int64]
 Marks = NDArray[np.bool_]
+
+_BRIGHTER = Loop("sky_brighter", BYTES, INT, INT, INTS, INTS, INT, INT, FLOAT, INT, MARKS)
+_ESTIMATE = Loop("sky_estimate", BYTES, INT, INT, INT, INTS, INTS, INTS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +57,11 @@ class SkyBackground:
         """Which pixels (rows, columns) exceed the level by ``sigmas`` of the noise and by ``least``
         1/16 DN."""
         height, width = picture.shape
+        if _BRIGHTER:
+            found = np.empty((height, width), np.bool_)
+            cells = (self.levels, self.noises, *self.levels.shape)
+            _BRIGHTER(np.ascontiguousarray(picture), *picture.shape, *cells, sigmas, least, found)
+            return found
         y, x = np.arange(height)[:, None], np.arange(BLOCK // 2, width + BLOCK, BLOCK)[None, :]
         above = np.maximum(sigmas * self.interpolated(self.noises, y, x), least)
         levels = (self.interpolated(self.levels, y, x) + above) // UNIT
@@ -101,19 +111,33 @@ def estimate(
     side = CELL // step
     count, pairs = side * side, side * (side - 1)
     down, across = (size // side for size in samples.shape)
+    to_sigma = round(256 * UNIT / (3 * pairs // 4 * _QUARTILE_MEAN))
+    if _ESTIMATE:
+        (middle, smaller), totals = np.empty((2, down, across), np.int64), np.empty(2, np.int64)
+        _ESTIMATE(np.ascontiguousarray(samples), down, across, side, middle, smaller, totals)
+        bins, share = int(totals[0]), int(totals[1]) / samples.size
+    else:
+        middle, smaller, bins, share = _sums(samples, side)
+    return SkyBackground(
+        middle * UNIT // (count // 2),
+        np.maximum(smaller * to_sigma >> 8, round(least_noise)),
+        share,
+        samples.size,
+        down * across * pairs,
+        bins,
+    )
+
+
+def _sums(samples: NDArray[np.uint8], side: int) -> tuple[Ints, Ints, int, float]:
+    """Sums (cells down, cells across) of the middle half of the samples and of the smaller
+    differences; the bins added up; the share of samples at the end of the scale."""
+    count, pairs = side * side, side * (side - 1)
+    down, across = (size // side for size in samples.shape)
     cells = samples.reshape(down, side, across, side).transpose(0, 2, 1, 3).astype(np.int16)
     values = np.sort(cells.reshape(down, across, count))
     differences = np.sort(np.abs(np.diff(cells)).reshape(down, across, pairs))
     middle = values[..., count // 4 : 3 * count // 4].sum(axis=-1, dtype=np.int64)
     smaller = differences[..., : 3 * pairs // 4].sum(axis=-1, dtype=np.int64)
-    to_sigma = round(256 * UNIT / (3 * pairs // 4 * _QUARTILE_MEAN))
     bins = int(values[..., 3 * count // 4].sum() - values[..., 0].sum())
     bins += int(differences[..., 3 * pairs // 4].sum()) + 2 * down * across
-    return SkyBackground(
-        middle * UNIT // (count // 2),
-        np.maximum(smaller * to_sigma >> 8, round(least_noise)),
-        float(np.mean(values == 255)),
-        samples.size,
-        differences.size,
-        bins,
-    )
+    return middle, smaller, bins, float(np.mean(values == 255))

@@ -7,9 +7,14 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.firmware_model.mcu.inner_loops import INT, INTS, MARKS, Loop
+
 Ints = NDArray[np.int64]
 Reals = NDArray[np.float64]
 Marks = NDArray[np.bool_]
+
+_OF = Loop("runs_of", MARKS, INT, INTS, INT)
+_JOIN = Loop("runs_join", INTS, INTS, INT, INT, INTS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,6 +27,14 @@ class Runs:
     @classmethod
     def of(cls, bright: Marks) -> Self:
         """Runs of a mask (rows, columns) whose last column is False."""
+        if _OF:
+            marks, most = np.ascontiguousarray(bright), 4096
+            while True:
+                edges = np.empty(most, np.int64)
+                found = _OF(marks, marks.size, edges, most)
+                if found <= most:
+                    return cls(edges[:found:2], edges[1:found:2])
+                most = found
         edges = np.flatnonzero(np.diff(bright.reshape(-1).view(np.int8), prepend=np.int8(0)))
         return cls(edges[::2], edges[1::2])
 
@@ -52,6 +65,10 @@ class Runs:
         """Number of each run's region (n,), in the order of their first runs, and the number of
         pairs of runs that touch, by sides or corners, in a picture of a ``width``."""
         begins, ends = self.begins, self.ends
+        if _JOIN:
+            begins, ends = np.ascontiguousarray(begins), np.ascontiguousarray(ends)
+            labels = np.empty(len(begins), np.int64)
+            return labels, _JOIN(begins, ends, len(begins), width, labels)
         # Runs of the row below touch that end behind, and begin before, this one moved down by a
         # row; corners count.
         first = np.searchsorted(ends, begins + width, "left")

@@ -23,6 +23,7 @@ from cubestack.emulator.faults.parts import flip_bits
 from cubestack.emulator.faults.sites import Sites
 from cubestack.emulator.rtl.factory import EngineKind
 from cubestack.emulator.scene.sky import Scene
+from cubestack.emulator.sim.firmware_loops import offer_firmware_loops
 from cubestack.emulator.sim.power import Part, PowerTable
 from cubestack.emulator.sim.processor import Processor
 from cubestack.firmware_model.aramis.catalogue.database import Database
@@ -112,6 +113,7 @@ class AramisBoard(Board):
         self._frames: deque[RollingShutter] = deque(maxlen=REMEMBERED)
         self._frame = 0
         meter = Meter(BLACKFIN_BF533)
+        offer_firmware_loops()
 
         def boot(cause: int) -> AramisProgram:
             self._hardware.reset_cause = cause

@@ -15,6 +15,7 @@ from cubestack.emulator.camera.common.view import SkyView
 from cubestack.emulator.faults.sites import Sites
 from cubestack.emulator.rtl.factory import EngineKind
 from cubestack.emulator.scene.sky import Scene
+from cubestack.emulator.sim.firmware_loops import offer_firmware_loops
 from cubestack.emulator.sim.processor import Processor
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.cubestar.commands import WATCHDOG_US
@@ -72,6 +73,7 @@ class CubeStarBoard(CubeStarStack):
         super().__init__(scene, engine=engine, layout=layout, **common)
         self._node_link(lambda: self.program.link, baud, i2c_address)
         meter = Meter(CORTEX_M3)
+        offer_firmware_loops()
 
         def boot(cause: int) -> CubeStarProgram:
             self._hardware.reset_causes.add(cause)

@@ -25,11 +25,16 @@ from numpy.typing import NDArray
 from cubestack.firmware_model.aramis.arrays import Mask
 from cubestack.firmware_model.aramis.field import CameraField
 from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.mcu.inner_loops import BYTES, INT, INTS, MARKS, Loop
 
 FRAMES = 5
 
 WINDOW = 5
 HALF = 13
+
+_LEVELS = Loop("mask_levels", BYTES, MARKS, INT, INTS)
+_CENTRE = Loop("mask_centre", MARKS, INT, INT, INT, MARKS)
+_WINDOW = Loop("mask_window", MARKS, INT, INT, INT, MARKS)
 
 
 class LevelHistory:
@@ -45,7 +50,7 @@ class LevelHistory:
 
     def add(self, picture: NDArray[np.uint8], field: CameraField, meter: Meter) -> None:
         """Count a picture (rows, columns), without the pixels outside the field."""
-        levels = np.bincount(picture[field.mask], minlength=256).astype(np.int64)
+        levels = _levels(picture, field.mask)
         values, pixels = np.arange(256), field.pixels
         self.sums.append((pixels, int(levels @ values), int(levels @ values**2)))
         meter.charge(pixel_read=pixels, i32_add=2 * pixels, i32_mul=pixels, loop=pixels)
@@ -73,6 +78,15 @@ class LevelHistory:
         return pixels, total, squares
 
 
+def _levels(picture: NDArray[np.uint8], inside: Mask) -> NDArray[np.int64]:
+    """Number of pixels of each level (256,)."""
+    if _LEVELS:
+        levels = np.empty(256, np.int64)
+        _LEVELS(np.ascontiguousarray(picture), inside, picture.size, levels)
+        return levels
+    return np.bincount(picture[inside], minlength=256).astype(np.int64)
+
+
 class SpikeRemoval(IntEnum):
     """Which method is used."""
 
@@ -84,6 +98,10 @@ class SpikeRemoval(IntEnum):
 def remove_spikes(mask: Mask, method: SpikeRemoval, needed: int) -> tuple[Mask, int]:
     """Which of the bright pixels of a mask (rows, columns) are stars', and the number of windows
     that were cleared; ``needed``: bright pixels that a window of 25 must have."""
+    compiled = {SpikeRemoval.CENTRE: _CENTRE, SpikeRemoval.WINDOW: _WINDOW}.get(method)
+    if compiled:
+        stars = np.empty(mask.shape, np.bool_)
+        return stars, compiled(np.ascontiguousarray(mask), *mask.shape, needed, stars)
     if method is SpikeRemoval.CENTRE:
         return _centre(mask, needed), 0
     if method is SpikeRemoval.WINDOW:

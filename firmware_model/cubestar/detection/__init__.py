@@ -18,8 +18,13 @@ from cubestack.firmware_model.cubestar.detection.contract import (
     Search,
     SearchEnd,
 )
-from cubestack.firmware_model.cubestar.detection.sampled import sampled_search
+from cubestack.firmware_model.cubestar.detection.sampled import (
+    SAMPLED_SEARCH,
+    compiled_search,
+    sampled_search,
+)
 from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.mcu.inner_loops import BYTES, INT, INT32S, Loop
 
 __all__ = [
     "Detection",
@@ -34,6 +39,8 @@ __all__ = [
     "search_stars",
 ]
 
+_LOOK = Loop("look_at", BYTES, INT32S, INT, INT, BYTES)
+
 
 def detect_stars(image: NDArray[np.uint8], config: DetectionConfig, meter: Meter) -> Detection:
     """Find the stars of an image (rows, columns) of 8-bit values, which is not changed.
@@ -43,6 +50,9 @@ def detect_stars(image: NDArray[np.uint8], config: DetectionConfig, meter: Meter
     """
     rows, columns = image.shape
     pixels = image.reshape(-1).copy()
+    if SAMPLED_SEARCH and not config.background:
+        config.check_region(rows, columns)
+        return compiled_search(pixels, rows, columns, config, meter)
     search, answer = search_stars(rows, columns, config, meter), None
     while True:
         try:
@@ -52,13 +62,20 @@ def detect_stars(image: NDArray[np.uint8], config: DetectionConfig, meter: Meter
             return detection
         match access:
             case Look():
-                values = pixels[access.offsets]
-                above = np.flatnonzero(values > access.above)
-                answer = values[: above[0] + 1] if len(above) else values
+                answer = _look(pixels, access)
                 meter.charge(ebi_read=len(answer))
             case Put():
                 pixels[access.offsets] = access.values
                 meter.charge(ebi_write=len(access.offsets))
+
+
+def _look(pixels: NDArray[np.uint8], access: Look) -> NDArray[np.uint8]:
+    if _LOOK:
+        values = np.empty(len(access.offsets), np.uint8)
+        return values[: _LOOK(pixels, access.offsets, len(values), access.above, values)]
+    values = pixels[access.offsets]
+    above = np.flatnonzero(values > access.above)
+    return values[: above[0] + 1] if len(above) else values
 
 
 def search_stars(rows: int, columns: int, config: DetectionConfig, meter: Meter) -> Search:

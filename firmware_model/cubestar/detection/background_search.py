@@ -14,6 +14,7 @@ Time is limited: rows that are not reached are not searched. What it costs is in
 
 from collections.abc import Generator
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -111,6 +112,14 @@ class _Region:
         return Look(offsets.astype(np.int32).reshape(-1))
 
 
+@lru_cache(maxsize=2)
+def _every_offset(region: _Region) -> NDArray[np.int32]:
+    """Of all pixels of a region; read-only."""
+    offsets = region.look(np.arange(region.height)[:, None], np.arange(region.width)).offsets
+    offsets.flags.writeable = False
+    return offsets
+
+
 def _read(region: _Region, meter: Meter) -> Generator[Look, Any, tuple[SkyBackground, Bytes]]:
     """The background and the pixels (rows, columns) of a region."""
     height, width = region.height, region.width
@@ -119,7 +128,7 @@ def _read(region: _Region, meter: Meter) -> Generator[Look, Any, tuple[SkyBackgr
     sky = background.estimate(read.reshape(len(down), len(across)), STEP)
     charges.charge_background(sky, meter)
     # The program looks at each row when it has read it; the reads cost the same.
-    pixels = yield region.look(np.arange(height)[:, None], np.arange(width))
+    pixels = yield Look(_every_offset(region))
     return sky, pixels.reshape(height, width)
 
 

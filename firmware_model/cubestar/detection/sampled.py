@@ -22,6 +22,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cubestack.firmware_model.cubestar.detection.contract import (
     Detection,
@@ -32,6 +33,9 @@ from cubestack.firmware_model.cubestar.detection.contract import (
     SearchEnd,
 )
 from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.mcu.inner_loops import BYTES, FLOATS, INT, INTS, Loop
+
+SAMPLED_SEARCH = Loop("sampled_search", BYTES, INT, INT, INTS, FLOATS, INTS, INTS, INTS)
 
 
 @dataclass(frozen=True)
@@ -68,12 +72,8 @@ def sampled_search(rows: int, columns: int, config: DetectionConfig, meter: Mete
             area = yield from _grow(int(samples[read - 1]), int(found[-1]), columns, rows, config)
             visited += area.offsets
             values += area.values
-            count = len(area.offsets)  # two calls, a list entry, a brightness; a neighbour's test
-            tests = area.looked_at
-            meter.charge(
-                call=2 * count, ram_write=2 * count, loop=tests, i32_add=5 * count + 3 * tests
-            )
-            meter.charge(ram_read=count, ram_write=count, loop=count)  # into the list of visited
+            count = len(area.offsets)
+            _charge_growing(count, area.looked_at, meter)
             if not area.complete:
                 invalid += 1
             elif count < config.min_pixels:
@@ -81,16 +81,15 @@ def sampled_search(rows: int, columns: int, config: DetectionConfig, meter: Mete
             else:
                 areas.append(area)
                 with meter.phase("centroid"):
-                    centroids.append(_centroid(area, columns, config, meter))
+                    _charge_centroids(count, 1, meter)
+                centroids.append(_centroid(area, columns, config))
             if len(areas) == config.max_stars:
                 end = SearchEnd.STARS
             elif invalid > config.max_invalid:
                 end = SearchEnd.INVALID
             elif noise > config.max_noise:
                 end = SearchEnd.NOISE
-        # The place, two comparisons and a step; what does not fit into registers comes from RAM.
-        meter.charge(i32_add=4 * read + 2 * background, ram_read=3 * read, loop=read, i32_div=1)
-        meter.charge(ram_read=len(visited), loop=len(visited))
+        _charge_samples(read, background, len(visited), meter)
         yield Put(np.array(visited, np.int32), np.array(values, np.uint8))
     return Detection(
         centroids=np.array(centroids, dtype=np.float32).reshape(-1, 2),
@@ -101,6 +100,71 @@ def sampled_search(rows: int, columns: int, config: DetectionConfig, meter: Mete
         dark_value=(total + background // 2) // background if background else 0,
         end=end,
     )
+
+
+def compiled_search(
+    pixels: NDArray[np.uint8], rows: int, columns: int, config: DetectionConfig, meter: Meter
+) -> Detection:
+    """The same search and charges on a memory (rows * columns,) that is changed; charges the
+    accesses too."""
+    most = config.max_stars
+    centroids, counts = np.empty((most, 2), np.float32), np.empty(11, np.int64)
+    sizes, sums = np.empty((2, most), np.int64)
+    SAMPLED_SEARCH(pixels, rows, columns, _settings(config), centroids, sizes, sums, counts)
+    end, invalid, noise, stars, read, background, total, *grown = counts.tolist()
+    visited, tests, areas, star_pixels = grown
+    with meter.phase("search"):
+        meter.charge(ebi_read=read + tests, ebi_write=2 * visited)
+        if areas:
+            _charge_growing(visited, tests, meter)
+        _charge_samples(read, background, visited, meter)
+    if stars:
+        with meter.phase("centroid"):
+            _charge_centroids(star_pixels, stars, meter)
+    return Detection(
+        centroids=centroids[:stars],
+        sizes=sizes[:stars].astype(np.uint8),
+        intensities=sums[:stars].astype(np.uint16),
+        invalid=invalid,
+        noise=noise,
+        dark_value=(total + background // 2) // background if background else 0,
+        end=_ENDS[end],
+    )
+
+
+#: In the order of sampled.cpp.
+_ENDS = SearchEnd.COMPLETE, SearchEnd.STARS, SearchEnd.INVALID, SearchEnd.NOISE
+
+
+def _settings(config: DetectionConfig) -> NDArray[np.int64]:
+    """In the order of sampled.cpp."""
+    region = config.step, config.x_start, config.x_end, config.y_start, config.y_end
+    areas = config.seed_threshold, config.star_threshold, config.min_pixels, config.max_pixels
+    limits = config.grid_size // 2, config.max_stars, config.max_invalid, config.max_noise
+    return np.array([*region, *areas, *limits, _floor(config)], np.int64)
+
+
+def _floor(config: DetectionConfig) -> int:
+    return 0 if config.plain_weights else config.star_threshold
+
+
+def _charge_growing(count: int, tests: int, meter: Meter) -> None:
+    """Of each of ``count`` pixels two calls, a list entry and a brightness, and its place in the
+    list of visited ones; ``tests`` of neighbours."""
+    meter.charge(call=2 * count, ram_write=2 * count, loop=tests, i32_add=5 * count + 3 * tests)
+    meter.charge(ram_read=count, ram_write=count, loop=count)
+
+
+def _charge_centroids(pixels: int, count: int, meter: Meter) -> None:
+    meter.charge(ram_read=4 * pixels, i32_add=24 * pixels, i32_mul=2 * pixels, loop=2 * pixels)
+    meter.charge(i32_div=2 * count, f32_convert=5 * count, f32_div=2 * count, f32_add=2 * count)
+
+
+def _charge_samples(read: int, background: int, visited: int, meter: Meter) -> None:
+    """The place, two comparisons and a step; what does not fit into registers comes from RAM. The
+    visited pixels are restored."""
+    meter.charge(i32_add=4 * read + 2 * background, ram_read=3 * read, loop=read, i32_div=1)
+    meter.charge(ram_read=visited, loop=visited)
 
 
 def _grow(
@@ -142,11 +206,9 @@ def _neighbours(place: int, columns: int, rows: int) -> list[int]:
     return [neighbour for inside, neighbour in around if inside]
 
 
-def _centroid(
-    area: _Area, columns: int, config: DetectionConfig, meter: Meter
-) -> tuple[np.float32, np.float32]:
+def _centroid(area: _Area, columns: int, config: DetectionConfig) -> tuple[np.float32, np.float32]:
     """Weighted mean position (x, y) in px over the grid around the brightest pixel."""
-    floor = 0 if config.plain_weights else config.star_threshold
+    floor = _floor(config)
     places = [divmod(offset, columns) for offset in area.offsets]
     peak = max(area.values)
     tied = [place for place, value in zip(places, area.values, strict=True) if value == peak]
@@ -160,19 +222,9 @@ def _centroid(
             sum_x += above * (x - middle_x)
             sum_y += above * (y - middle_y)
             weight += above
-    count = len(places)
-    meter.charge(
-        ram_read=4 * count,
-        i32_add=24 * count,
-        i32_mul=2 * count,
-        loop=2 * count,
-        i32_div=2,
-        f32_convert=5,
-        f32_div=2,
-        f32_add=2,
-    )
     total = np.float32(weight)
-    return (
-        np.float32(middle_x) + np.float32(sum_x) / total,
-        np.float32(middle_y) + np.float32(sum_y) / total,
-    )
+    with np.errstate(invalid="ignore"):  # a grid without any of the area's pixels
+        return (
+            np.float32(middle_x) + np.float32(sum_x) / total,
+            np.float32(middle_y) + np.float32(sum_y) / total,
+        )

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.cubestar.detection.spots import ELECTRONS_PER_DN, HALF, SATURATED_DN
+from cubestack.firmware_model.mcu.inner_loops import BYTES, FLOAT, INT, INTS, MARKS, Loop
 from cubestack.firmware_model.star_tracker.background import CELL, UNIT, Ints, Marks, SkyBackground
 
 #: Range of a cell and its eight neighbours from which on it is steep, in DN and in times the noise
@@ -25,6 +26,8 @@ REACH = HALF + 1  #: distance of the pixels compared with: beyond a spot
 #: That are looked at in all directions: they take 20 ms. The Earth's limb across the picture has up
 #: to 8000; those below are not searched.
 MOST_PLACES = 10_000
+
+_ALONG_ROWS = Loop("steep_along_rows", BYTES, MARKS, *[INT] * 5, FLOAT, INT, INT, INT, INTS, INT)
 
 _OTHER_WAYS = REACH * np.array([[-1, 0], [1, 0], [-1, -1], [1, 1], [-1, 1], [1, -1]])
 
@@ -57,6 +60,13 @@ def steep(sky: SkyBackground, height: int, width: int) -> Marks:
 
 def along_rows(picture: NDArray[np.uint8], marks: Marks, sky: SkyBackground, least: int) -> Places:
     """Marked pixels that exceed their row by ``least`` (1/16 DN) at least."""
+    if _ALONG_ROWS:
+        most = int(np.count_nonzero(marks))
+        places = np.empty((4, most), np.int64)
+        limits = SIGMAS, ELECTRONS_PER_DN, BLIND_DN * UNIT, int(np.median(sky.noises)), least
+        pictures = np.ascontiguousarray(picture), np.ascontiguousarray(marks)
+        found = _ALONG_ROWS(*pictures, *picture.shape, REACH, UNIT, *limits, places, most)
+        return Places(*places[:, :found])
     rows, columns = np.nonzero(marks)
     last = picture.shape[1] - 1
     one = picture[rows, np.maximum(columns - REACH, 0)].astype(np.int64)
