@@ -2,7 +2,8 @@
 
 seccomp  The kernel sends the program's calls to a supervisor in this process. Works with any
          program, including static ones, and without a compiler. Needs Linux 5.9, and permission
-         to install a filter.
+         to install a filter. With a compiler, a small library in dynamic programs repeats the calls
+         that a signal ended too early.
 preload  A library in the program intercepts the calls. Works with programs that are linked
          dynamically with glibc. Needs a C compiler, once; works in containers that forbid seccomp.
 """
@@ -53,6 +54,19 @@ class RouteError(RuntimeError):
 def bus_environment(bus: int, path: str) -> dict[str, str]:
     """Environment variables for a program: number of the bus, and path of its socket."""
     return {"CUBESTACK_I2C_BUS": str(bus), "CUBESTACK_I2C_SOCKET": path}
+
+
+def preload_environment(library: Path) -> dict[str, str]:
+    """Environment variables that load ``library`` before those of the user; raises RouteError."""
+    if SEPARATORS & set(str(library)):
+        raise RouteError(f"{library} has a blank or colon; set XDG_CACHE_HOME to another folder")
+    libraries = (str(library), os.environ.get("LD_PRELOAD", ""))
+    # AddressSanitizer otherwise refuses any library that is loaded before its own
+    options = (os.environ.get("ASAN_OPTIONS", ""), "verify_asan_link_order=0")
+    return {
+        "LD_PRELOAD": " ".join(filter(None, libraries)),
+        "ASAN_OPTIONS": ":".join(filter(None, options)),
+    }
 
 
 class GuestProcess(Endpoint):
@@ -147,13 +161,9 @@ def start_preloaded(
     program = shutil.which(command[0])
     if program is not None and is_static(Path(program)):
         raise RouteError(f"{program} is linked statically, so no library can be loaded into it")
-    if SEPARATORS & set(str(library)):
-        raise RouteError(f"{library} has a blank or colon; set XDG_CACHE_HOME to another folder")
-    others = os.environ.get("LD_PRELOAD")
-    preload = f"{library} {others}" if others else str(library)
     process = subprocess.Popen(
         command,
-        env=os.environ | environment | {"LD_PRELOAD": preload},
+        env=os.environ | environment | preload_environment(library),
         close_fds=False,
         stdout=streams[0],
         stderr=streams[1],

@@ -16,11 +16,12 @@ from cubestack.emulator.i2cdev.adapter import I2cAdapter
 from cubestack.emulator.i2cdev.device_file import DeviceFile
 from cubestack.emulator.i2cdev.device_node import DeviceNode
 from cubestack.emulator.i2cdev.pacing import Watch, sharpen_timers
-from cubestack.emulator.i2cdev.preload.shim import shim_library
+from cubestack.emulator.i2cdev.preload.shim import repeat_library, shim_library
 from cubestack.emulator.i2cdev.remote import RemoteBus
 from cubestack.emulator.i2cdev.scheduler import TURNAROUND_NS, open_scheduler
 from cubestack.emulator.i2cdev.seccomp.supervisor import Files, Supervisor
 from cubestack.emulator.i2cdev.server import I2cServer
+from cubestack.emulator.native.compiler import CompilerError
 from cubestack.emulator.ports.endpoint import Endpoint, PortError
 from cubestack.emulator.sim.virtual_time import Kernel
 
@@ -275,8 +276,9 @@ def _start(
     refused = ""
     if route != "preload":
         try:
+            repeating, limit = _repeating()
             program, supervisor = guest_process.start_filtered(
-                command, environment, DeviceNode(number), bus.files, streams
+                command, environment | repeating, DeviceNode(number), bus.files, streams
             )
         except guest_process.RouteError as error:
             if route == "seccomp":
@@ -284,9 +286,17 @@ def _start(
             refused = f", as seccomp is not available: {error}"
         else:
             reason = "as requested" if route else "which works with any program"
-            return program, supervisor, f"seccomp, {reason}"
+            return program, supervisor, f"seccomp, {reason}{limit}"
     try:
         program = guest_process.start_preloaded(command, environment, shim_library(), streams)
     except guest_process.RouteError as error:
         raise guest_process.RouteError(f"preload: {error}{refused}") from None
     return program, None, f"preload{refused or ', as requested'}"
+
+
+def _repeating() -> tuple[dict[str, str], str]:
+    """Environment variables that load the repeating library; else none, and the reason."""
+    try:
+        return guest_process.preload_environment(repeat_library()), ""
+    except (CompilerError, guest_process.RouteError) as error:
+        return {}, f"; a signal can end a call with EINTR ({error})"

@@ -1,4 +1,4 @@
-"""Builds the library for LD_PRELOAD, once, in the user's cache folder."""
+"""Builds the libraries for LD_PRELOAD, once, in the user's cache folder."""
 
 import hashlib
 import importlib.util
@@ -19,7 +19,9 @@ from cubestack.firmware_model.formats.i2c_socket import VERSION, Call
 from cubestack.firmware_model.formats.linux_i2c import MAX_MESSAGE_BYTES, SMBUS_DATA_BYTES
 
 SOURCE = Path(__file__).with_name("shim.c")
-"""It includes the other files of C in its folder."""
+"""It includes the other files of C in its folder, but ``REPEAT``."""
+
+REPEAT = "repeat.c"
 
 FLAGS = ("-std=gnu11", "-O2", "-fPIC", "-shared", "-Wall")
 LIBRARIES = ("-ldl", "-lpthread")
@@ -46,24 +48,35 @@ def find_c_compiler() -> list[str] | None:
 
 
 def shim_library(folder: Path | None = None) -> Path:
-    """The shared library, from the cache or built now; ``folder`` replaces the cache folder.
+    """The library of the preload route, from the cache or built now.
+
+    ``folder`` replaces the cache folder.
 
     Raises:
         NoCompilerError: there is no C compiler.
         CompilerError: the compiler failed; the message names the log.
     """
+    return _library(SOURCE, folder)
+
+
+def repeat_library(folder: Path | None = None) -> Path:
+    """The library that repeats calls under the seccomp route, as ``shim_library``."""
+    return _library(SOURCE.with_name(REPEAT), folder)
+
+
+def _library(source: Path, folder: Path | None) -> Path:
     folder = cache_folder() if folder is None else folder
     compiler = find_c_compiler()
     if compiler is None:
         raise NoCompilerError("no C compiler (cc, gcc, clang or the ziglang wheel) found")
-    library = folder / f"i2c-{_key(compiler)}.so"
+    library = folder / f"i2c-{source.stem}-{_key(compiler)}.so"
     if library.is_file():
         return library
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=folder) as scratch:
             built = Path(scratch) / "shim.so"
-            options = [*FLAGS, *_definitions(), str(SOURCE), "-o", str(built), *LIBRARIES]
+            options = [*FLAGS, *_definitions(), str(source), "-o", str(built), *LIBRARIES]
             run_compiler(compiler, options, built, library.with_suffix(".log"))
             built.replace(library)
     except OSError as error:

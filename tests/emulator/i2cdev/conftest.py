@@ -126,6 +126,7 @@ def run_guest(
     pace: Literal["real", "fast"] = "fast",
     timeout_s: float = 60.0,
     streams: Streams | None = None,
+    report: Callable[[str], None] = lambda _text: None,
 ) -> tuple[int, str]:
     """Exit status and output of a program on a bus with one target; skips without the route.
 
@@ -146,6 +147,7 @@ def run_guest(
                 route=route,
                 streams=streams or (output.fileno(), None),
                 timeout_s=timeout_s,
+                report=report,
             )
         except RouteError as error:
             pytest.skip(str(error))

@@ -63,6 +63,15 @@ def test_rejects_programs_that_cannot_be_preloaded(tmp_path, monkeypatch):
         program.start_preloaded(["sh"], {}, tmp_path / "none.so")
 
 
+def test_preloads_before_the_libraries_and_options_of_the_user(tmp_path, monkeypatch):
+    monkeypatch.setenv("LD_PRELOAD", "theirs.so")
+    monkeypatch.setenv("ASAN_OPTIONS", "detect_leaks=0")
+    assert program.preload_environment(tmp_path / "ours.so") == {
+        "LD_PRELOAD": f"{tmp_path}/ours.so theirs.so",
+        "ASAN_OPTIONS": "detect_leaks=0:verify_asan_link_order=0",
+    }
+
+
 needs_c = pytest.mark.skipif(shim.find_c_compiler() is None, reason="no C compiler here")
 
 
