@@ -27,7 +27,7 @@ DOCUMENTS ?=
 # Nothing here is made by a built-in rule: one would make "setup" of setup.sh.
 MAKEFLAGS += --no-builtin-rules
 
-.PHONY: help venv run docs test test-all test-hdl test-clients pasted firmware mutants lint wheels bench bench-engines clean
+.PHONY: help venv run docs test test-all test-hdl test-clients test-suites pasted firmware mutants lint wheels bench bench-engines clean
 
 help:
 	@echo "make run       set up, then boot the sensors, measure over their serial ports, and draw what they saw"
@@ -35,6 +35,7 @@ help:
 	@echo "make test-all  set up, then run all tests"
 	@echo "make test-hdl  set up, then simulate the gateware: more than make test does, with coverage"
 	@echo "make test-clients  set up, install programs of others, then run them on the emulated ports"
+	@echo "make test-suites  set up, install test suites of others, then run them on the simulator; EVERY=20 runs a part"
 	@echo "make pasted    paste the commands of README.md and docs/ into a fresh clone, and tell how they end"
 	@echo "make firmware  set up, then build CubeStar's program in C with arm-none-eabi-gcc"
 	@echo "make mutants   set up, then count the wrong gates that the gateware's testbenches notice; takes long"
@@ -95,6 +96,14 @@ test-clients: .venv/ready-dev
 	@tests/system/clients.sh out/clients
 	@CUBESTACK_CLIENTS=$(CURDIR)/out/clients $(PYTEST) -n 0 -m "slow or not slow" -rs tests/system/i2c_programs \
 		tests/system/serial_programs
+
+# One in EVERY files of the compiler's suite.
+EVERY ?= 1
+
+test-suites: .venv/ready-dev
+	@tests/emulator/iss/suites/install.sh
+	@CUBESTACK_SUITES=$(EVERY) CUBESTACK_SUITES_SEED=$(SEED) $(PYTEST) -n 0 -m "slow or not slow" -rs -s \
+		tests/emulator/iss/suites
 
 bench: .venv/ready-run
 	@$(BIN)/cubestack bench

@@ -47,6 +47,7 @@ LONG_TARGETS = {
     "test-all",
     "test-hdl",
     "test-clients",
+    "test-suites",
     "mutants",
     "bench-engines",
     "libraries",
