@@ -51,6 +51,19 @@ class HostLine:
                 break
         return arrival
 
+    def arrival_of(self, end: int, until_ps: int | None, most: int, silence_ps: int) -> int | None:
+        """When the block that is arriving has its first byte ``end``, or its last of ``most`` by
+        ``until_ps``; None without any, where the ends have different formats, or where a byte
+        takes longer than ``silence_ps``."""
+        if not self._blocks or self._sampler is not None:
+            return None
+        data, first_ps, byte_ps = self._blocks[0]
+        last = min(len(data), most) - 1 if byte_ps <= silence_ps else -1
+        if until_ps is not None:
+            last = min(last, (until_ps - first_ps) // byte_ps)
+        place = data.find(end, 0, last + 1) if last >= 0 else -1
+        return None if last < 0 else first_ps + (last if place < 0 else place) * byte_ps
+
     def take(self, now_ps: int, max_bytes: int | None = None) -> bytes:
         """Return and remove at most ``max_bytes`` bytes that have arrived by ``now_ps``."""
         if self._sampler is not None:
@@ -118,6 +131,23 @@ class DirectSerial:
 
     def write(self, data: bytes) -> None:
         self._line.uart.host_writes(data)
+
+    def read_on(self, end: int, max_bytes: int, timeout_s: float) -> bytes:
+        """Read as ``read`` does, and go on to the next byte ``end`` where nothing happens before.
+
+        Between two bytes of a block that the device sends, a host that only waits for ``end``
+        changes nothing. Up to the next event, or with an observer of steps, each byte counts.
+        """
+        data = self.read(max_bytes, timeout_s)
+        horizon = self._env.horizon()
+        if not data or end in data or self._env.watched:
+            return data
+        silence_ps = int(timeout_s * PS_PER_S)
+        arrival = self._line.arrival_of(end, horizon, max_bytes - len(data), silence_ps)
+        if arrival is not None:
+            self._env.advance_to(arrival)
+            data += self._line.take(arrival, max_bytes - len(data))
+        return data
 
     def read(self, max_bytes: int, timeout_s: float) -> bytes:
         """Wait up to ``timeout_s`` of virtual time for a byte; returns those that have arrived."""

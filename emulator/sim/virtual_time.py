@@ -54,6 +54,11 @@ class Kernel(simpy.Environment):
         peek = self.peek()
         return None if peek == float("inf") else int(peek)
 
+    @property
+    def watched(self) -> bool:
+        """Whether a trace or a debugger observes each step."""
+        return "step" in vars(self)
+
     def advance_to(self, time_ps: int) -> None:
         """Run all events before ``time_ps``, then stop at that time; a past time does nothing.
 
@@ -61,7 +66,7 @@ class Kernel(simpy.Environment):
         """
         if time_ps <= self._now:
             return
-        if self.peek() >= time_ps and "step" not in vars(self):
+        if self.peek() >= time_ps and not self.watched:
             self._now = time_ps  # no event until then, and no observer of steps
             return
         arrival = self.urgent(time_ps)  # limits the look-ahead of others

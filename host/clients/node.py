@@ -7,11 +7,16 @@ belongs to the request before it, and only one request is pending at a time.
 from collections.abc import Iterator
 
 from cubestack.firmware_model.interface.codec.field import Value
-from cubestack.firmware_model.interface.codec.frames import FrameDecoder, FrameEvent, encode_frame
+from cubestack.firmware_model.interface.codec.frames import (
+    END,
+    FrameDecoder,
+    FrameEvent,
+    encode_frame,
+)
 from cubestack.firmware_model.interface.codec.message import Interface
 from cubestack.host.clients.contract import Client
 from cubestack.host.errors import BadAnswerError, NoAnswerError
-from cubestack.host.transport.streams import Transport
+from cubestack.host.transport.streams import Transport, read_frame_part
 
 READ_BYTES = 4096
 
@@ -110,7 +115,7 @@ class NodeClient(Client):
             for byte in self._unread:
                 if self._decoder.feed(byte) is FrameEvent.FRAME:
                     return self._decoder.payload
-            data = self._transport.read(READ_BYTES, self._timeout_s)
+            data = read_frame_part(self._transport, END, self._timeout_s)
             if not data:
                 return None
             self._unread = iter(data)

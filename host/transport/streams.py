@@ -42,6 +42,16 @@ def port_of(line: Transport) -> Transport:
     return beneath
 
 
+def read_frame_part(line: Transport, end: int, timeout_s: float) -> bytes:
+    """Read as ``line`` does; a line in virtual time goes on to the next byte ``end``, before which
+    no frame is whole."""
+    read_on = getattr(line, "read_on", None)
+    if read_on is None:
+        return line.read(READ_BYTES, timeout_s)
+    data: bytes = read_on(end, READ_BYTES, timeout_s)
+    return data
+
+
 def read_answer(line: Transport, length: int, silence_s: float) -> bytes:
     """Bytes until ``length`` of them or a silence of ``silence_s``."""
     answer = bytearray()

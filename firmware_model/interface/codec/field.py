@@ -19,8 +19,8 @@ from copy import copy
 from dataclasses import KW_ONLY, dataclass, field, replace
 from difflib import get_close_matches
 from enum import Enum, IntEnum
-from functools import partial
-from typing import Self, SupportsFloat
+from functools import cached_property, partial
+from typing import Self
 
 from cubestack.firmware_model.values import FLAG, NUMBER, WHOLE, Declaration
 
@@ -155,7 +155,7 @@ class Field(Declaration):
         bit = self.bit_offset % 8
         return f"{self.byte_offset}.{bit}" if bit or self.bits % 8 else f"{self.byte_offset}"
 
-    @property
+    @cached_property
     def bits(self) -> int:
         """Width in bits."""
         match = _BYTES.fullmatch(self.type)
@@ -183,7 +183,7 @@ class Field(Declaration):
         object.__setattr__(placed, "bit_offset", start)
         return placed
 
-    @property
+    @cached_property
     def raw_range(self) -> tuple[int, int]:
         """Smallest and largest raw count of an integer type."""
         if self.type == "i16":
@@ -196,10 +196,11 @@ class Field(Declaration):
         With ``saturate``, numbers beyond the type become its ends and not-a-number becomes 0 in
         an integer; without, they raise InterfaceError. A value of a wrong kind always does.
         """
-        if self.type.startswith("bytes"):
+        kind = self.type
+        if kind.startswith("bytes"):
             return self._encode_bytes(value)
-        number = self._number(value)
-        if self.type == "f32":
+        number = float(value) if isinstance(value, (int, float)) else self._number(value)
+        if kind == "f32":
             nearest = _nearest_f32(number)
             if math.isinf(nearest) and not math.isinf(number) and not saturate:
                 raise InterfaceError(f"field {self.name}: {value!r} is too large for a float32")
@@ -260,7 +261,7 @@ class Field(Declaration):
                 return float(names[value.lower()])
             hint = suggestion(value, [choice.name for choice in self.choices])
             raise InterfaceError(f"field {self.name}: no choice {value!r}; {hint}")
-        if isinstance(value, int | float | SupportsFloat):  # the protocol's look takes longer
+        if hasattr(value, "__float__"):  # SupportsFloat, but the protocol's look takes longer
             return float(value)
         raise InterfaceError(f"field {self.name}: {value!r} is not a number ({self.type})")
 

@@ -100,6 +100,10 @@ class Message:
                     f"message {self.name}: the reset value of {wrong[0][0].name} is out of range"
                 )
 
+    @cached_property
+    def _names(self) -> frozenset[str]:
+        return frozenset(field.name for field in self.fields)
+
     def of(self, *fields: Field, ordered: tuple[tuple[str, str], ...] = ()) -> "Message":
         """This message with consecutive ``fields`` and pairs of ``ordered`` field names."""
         return dataclasses.replace(self, fields=fields, ordered=ordered)
@@ -129,11 +133,13 @@ class Message:
         Telemetry saturates; a telecommand's value that does not fit its type, and an unknown or
         missing field, raise InterfaceError. The node checks limits (``violations``).
         """
-        for name in values:
-            if all(field.name != name for field in self.fields):
-                raise InterfaceError(f"{self.name} has no field {name!r}; {self._field_hint(name)}")
-        missing = [field.name for field in self.fields if field.name not in values]
-        if missing:
+        names = self._names
+        if values.keys() != names:
+            for name in values:
+                if name not in names:
+                    hint = self._field_hint(name)
+                    raise InterfaceError(f"{self.name} has no field {name!r}; {hint}")
+            missing = [field.name for field in self.fields if field.name not in values]
             raise InterfaceError(f"{self.name} needs a value for {', '.join(missing)}")
         saturate = self.kind is MessageKind.TELEMETRY
         whole = 0
@@ -227,11 +233,11 @@ class Interface:
 
     def telecommand(self, key: str | int) -> Message:
         """The telecommand with this name (in any case) or ID; raises InterfaceError if none."""
-        return self._lookup(self.telecommands, "telecommand", key)
+        return self._lookup(self._telecommands, "telecommand", key)
 
     def telemetry(self, key: str | int) -> Message:
         """The telemetry frame with this name (in any case) or ID; raises InterfaceError if none."""
-        return self._lookup(self.telemetries, "telemetry frame", key)
+        return self._lookup(self._telemetries, "telemetry frame", key)
 
     def find(self, identifier: int) -> Message | None:
         """The supported message with this ID byte; None for an invalid ID."""
@@ -241,9 +247,23 @@ class Interface:
     def _supported(self) -> dict[int, Message]:
         return {message.id: message for message in self.messages if message.supported}
 
-    def _lookup(self, messages: tuple[Message, ...], kind: str, key: str | int) -> Message:
-        for message in messages:
-            if key == message.id or (isinstance(key, str) and key.lower() == message.name.lower()):
-                return message
-        hint = suggestion(str(key), [message.name for message in messages])
+    @cached_property
+    def _telecommands(self) -> dict[str | int, Message]:
+        return _by_key(self.telecommands)
+
+    @cached_property
+    def _telemetries(self) -> dict[str | int, Message]:
+        return _by_key(self.telemetries)
+
+    def _lookup(self, messages: dict[str | int, Message], kind: str, key: str | int) -> Message:
+        found = messages.get(key.lower() if isinstance(key, str) else key)
+        if found is not None:
+            return found
+        hint = suggestion(str(key), list(dict.fromkeys(one.name for one in messages.values())))
         raise InterfaceError(f"{self.name} has no {kind} {key!r}; {hint}")
+
+
+def _by_key(messages: tuple[Message, ...]) -> dict[str | int, Message]:
+    """Messages by ID, and by name in lower case."""
+    by_key: dict[str | int, Message] = {one.id: one for one in messages}
+    return by_key | {one.name.lower(): one for one in messages}

@@ -1,6 +1,7 @@
 """The host's end of the line: every byte once, in order, never before its time."""
 
 import errno
+from functools import partial
 
 import pytest
 from hypothesis import given
@@ -14,6 +15,12 @@ from cubestack.emulator.ports.line import DirectSerial, HostLine
 from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
 from cubestack.firmware_model.formats.i2c_socket import Call, pack_ioctl, pack_read
 from cubestack.firmware_model.formats.linux_i2c import Ioctl
+from cubestack.firmware_model.interface.codec.frames import (
+    END,
+    FrameDecoder,
+    FrameEvent,
+    encode_frame,
+)
 
 from ..bus.ends import Memory
 from .conftest import ALL_BYTES
@@ -122,6 +129,55 @@ def test_other_events_do_not_end_a_read(device, serial):
     while not received.endswith(b"!"):
         received += serial.read(10, 1.0)
     assert device.kernel.now == 100 * BYTE
+
+
+def frames_in(
+    whole: bool, sent: list[tuple[int, bytes]], others: list[int], timeout_s: float
+) -> list[tuple[bytes | None, int]]:
+    """Payloads of all frames and the times at which a host has them, read by byte or ``whole``."""
+    kernel, uart, _ = make()
+    serial = DirectSerial(kernel, uart)
+    for after, data in sent:
+        kernel.timeout(after).callbacks.append(lambda _event, data=data: uart.send(data))
+    for after in others:
+        kernel.timeout(after)
+    read = partial(serial.read_on, END) if whole else serial.read
+    decoder, found, failures = FrameDecoder(20), [], 0
+    while failures < 3:
+        data = read(64, timeout_s)
+        failures += not data
+        for byte in data:
+            if decoder.feed(byte) is FrameEvent.FRAME:
+                found.append((decoder.payload, kernel.now))
+    return [*found, (None, kernel.now)]
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.integers(0, 60 * BYTE),
+            st.binary(max_size=6).map(encode_frame)
+            | st.lists(st.sampled_from([0x1F, 0x7F, 0xFF, 0]), max_size=8).map(bytes),
+        ),
+        max_size=8,
+    ),
+    st.lists(st.integers(0, 60 * BYTE), max_size=20),
+    st.sampled_from([0.0, 5e-6, 2e-5, 1e-3]),
+)
+def test_whole_frames_are_read_when_a_host_by_byte_has_them(sent, others, timeout_s):
+    whole = frames_in(True, sent, others, timeout_s)
+    assert whole == frames_in(False, sent, others, timeout_s)
+
+
+def test_observer_of_steps_sees_every_byte(device, serial):
+    device.uart.send(b"abcdef")
+    steps = []
+    vars(device.kernel)["step"] = lambda: (steps.append(0), Kernel.step(device.kernel))
+    assert serial.read_on(ord("f"), 64, 1.0) == b"a"
+    assert steps
+    del vars(device.kernel)["step"]
+    assert serial.read_on(ord("e"), 64, 1.0) == b"bcde"
+    assert device.kernel.now == 5 * BYTE
 
 
 def test_closed_link_receives_nothing(device, serial):
