@@ -104,14 +104,22 @@ class Meter:
             phase: sum([table[name] * count for name, count in operations.items()])
             for phase, operations in phases.items()
         }
-        total = self.total + sum(taken.values())
+        counts: dict[str, int] = {}
+        for operations in phases.values():
+            for name, count in operations.items():
+                counts[name] = counts.get(name, 0) + count
+        return self.charge_sums(taken, counts, limit)
+
+    def charge_sums(self, phases: Mapping[str, int], counts: Mapping[str, int], limit: int) -> bool:
+        """Charge cycles of phases and their operations by name, as ``charge_all`` does."""
+        total = self.total + sum(phases.values())
         if total > limit:
             return False
         self.total = total
-        for phase, cycles in taken.items():
+        for phase, cycles in phases.items():
             self.phases[phase] = self.phases.get(phase, 0) + cycles
-            for name, count in phases[phase].items():
-                self.counts[name] += count
+        for name, count in counts.items():
+            self.counts[name] += count
         return True
 
     def charge_elapsed(self, **operations: int) -> None:

@@ -11,9 +11,22 @@ from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 INT, FLOAT = ctypes.c_int64, ctypes.c_double
 """Arguments that are numbers."""
+
+
+POINTER = ctypes.c_void_p
+"""Argument that is the address of an array, see ``address``."""
+
+
+def address(array: NDArray[Any]) -> int:
+    """Where the elements of an array in C order begin; the caller keeps the array."""
+    if not array.flags.c_contiguous:
+        raise ValueError("the elements are not in C order")
+    begin: int = array.__array_interface__["data"][0]  # half the time of .ctypes.data
+    return begin
 
 
 def _array(kind: Any) -> Any:

@@ -22,9 +22,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.mcu.inner_loops import FLOAT, INT, POINTER, Loop, address
 
 Floats = NDArray[np.float32]
 Indices = NDArray[np.intp]
+
+_MATCHED = Loop(
+    "stars_matched", POINTER, INT, POINTER, INT, FLOAT, POINTER, POINTER, POINTER, POINTER
+)
 
 #: Added to the normal equations: a turn that nothing determines is none.
 _ALMOST_NOTHING = np.eye(4, dtype=np.float32) * np.float32(1e-6)
@@ -44,11 +49,10 @@ def matched(
     if compared == 0:
         nothing = np.zeros(0, np.intp)
         return nothing, nothing, np.zeros(0, np.float32)
-    apart = predicted.T[:, :, None] - measured.T[:, None, :]
-    apart *= apart
-    first, second, third = apart
     reach = float(radius_rad) ** 2
-    near = int(np.count_nonzero(first <= reach))
+    nearest, rows, distances, near = (_nearest_compiled if _MATCHED else _nearest)(
+        measured, predicted, reach
+    )
     meter.charge(
         f32_mul=count + 3 * near,
         f32_convert=count,
@@ -58,6 +62,17 @@ def matched(
         i32_add=2 * compared,
         loop=compared,
     )
+    return nearest, rows, distances
+
+
+def _nearest(
+    measured: Floats, predicted: Floats, reach: float
+) -> tuple[Indices, Indices, Floats, int]:
+    """``matched`` within the square ``reach``, and pairs whose first components are as close."""
+    apart = predicted.T[:, :, None] - measured.T[:, None, :]
+    apart *= apart
+    first, second, third = apart
+    near = int(np.count_nonzero(first <= reach))
     chord2 = first + second + third
     inside = (chord2.ravel() <= reach).nonzero()[0]
     rows, nearest = np.divmod(inside, len(measured))
@@ -65,7 +80,19 @@ def matched(
     if len(set(rows.tolist())) < len(rows) or len(set(nearest.tolist())) < len(rows):
         kept = (chord2.argmin(axis=1)[rows] == nearest) & (chord2.argmin(axis=0)[nearest] == rows)
         rows, nearest, smallest = rows[kept], nearest[kept], smallest[kept]
-    return nearest, rows, np.sqrt(smallest)
+    return nearest, rows, np.sqrt(smallest), near
+
+
+def _nearest_compiled(
+    measured: Floats, predicted: Floats, reach: float
+) -> tuple[Indices, Indices, Floats, int]:
+    here, there = np.ascontiguousarray(measured), np.ascontiguousarray(predicted)
+    most = min(len(here), len(there))
+    found, distances = np.empty((3, most), np.intp), np.empty(most, np.float32)
+    at = address(found)
+    places = at, at + 8 * most, address(distances), at + 16 * most
+    count = _MATCHED(address(here), len(here), address(there), len(there), reach, *places)
+    return found[0, :count], found[1, :count], distances[:count], int(found[2, 0])
 
 
 def false_alarm(hypotheses: float, expected: int, found: int, chance: float, meter: Meter) -> float:

@@ -37,5 +37,7 @@ def assert_same(one: object, other: object) -> None:
     elif is_dataclass(one):
         for field in fields(one):
             assert_same(getattr(one, field.name), getattr(other, field.name))
+    elif isinstance(one, float):
+        assert repr(one) == repr(other)  # nan too
     else:
         assert one == other
