@@ -15,73 +15,28 @@ processor time of an identification.
 import argparse
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from cubestack.emulator.boards.cubestar.catalogue import onboard_catalogue
-from cubestack.emulator.camera.mlx75412.lens import LENS
-from cubestack.emulator.scene.attitude import matrix_from_quaternion, random_quaternion
-from cubestack.emulator.scene.hipparcos import DEFAULT_EPOCH, load_sky
-from cubestack.firmware_model.attitude.field_of_view import field_of_view
-from cubestack.firmware_model.attitude.geometry import (
-    CameraParameters,
-    scaled,
-    undistort,
-    unit_vectors,
-)
+from cubestack.emulator.sim.firmware_loops import offer_firmware_loops
+from cubestack.firmware_model.attitude.geometry import scaled
 from cubestack.firmware_model.cubestar.matching.confirmed import identify
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.host.experiments.attitude import is_right
-
-NOISE_PX, BORDER_PX, MOST = 0.05, 3, 40
-LENS_NAMES = ("focal_length_mm", "fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2")
-CAMERA = CameraParameters(**{name: getattr(LENS, name) for name in LENS_NAMES})
-FIELD = field_of_view(CAMERA, LENS.columns, LENS.rows)
-CATALOGUE = onboard_catalogue()
+from cubestack.host.studies.cubestar.identification import CATALOGUE, FIELD, Centroids, picture
 
 Rays = NDArray[np.float32]
 Attitude = NDArray[np.float64]
 Solver = Callable[[Rays], tuple[float, Attitude | None]]
 
 
-@dataclass(frozen=True)
-class Centroids:
-    """A picture: unit vectors (n, 3), brightest first, how many are listed stars, the truth."""
-
-    rays: Rays
-    listed: int
-    attitude: Attitude
-
-
-def picture(rng: np.random.Generator, false: int, *, uncut: bool, mirrored: bool) -> Centroids:
-    """Centroids at a random pose: listed stars or all that the camera may see, and false stars of
-    magnitude 2 to 3.8; brightness is off by 0.05 mag."""
-    attitude = matrix_from_quaternion(random_quaternion(rng))
-    vectors, v_mag = CATALOGUE.vectors.astype(float), CATALOGUE.v_mag
-    if uncut:
-        sky = load_sky(DEFAULT_EPOCH, 5.5)
-        vectors, v_mag = sky.vectors, sky.v_mag
-    pixels = LENS.project(vectors @ attitude.T)
-    size = np.array([LENS.columns, LENS.rows])
-    seen = ((pixels > BORDER_PX) & (pixels < size - 1 - BORDER_PX)).all(axis=1)
-    pixels, v_mag = pixels[seen], v_mag[seen]
-    pixels = pixels + NOISE_PX * rng.standard_normal(pixels.shape)
-    pixels = np.concatenate([pixels, rng.uniform([0, 0], size - 1, (false, 2))])
-    v_mag = np.concatenate([v_mag, rng.uniform(2, 3.8, false)])
-    listed = int(np.count_nonzero(v_mag[: len(pixels) - false] < CATALOGUE.mag_limit))
-    order = np.argsort(v_mag + 0.05 * rng.standard_normal(len(v_mag)))[:MOST]
-    meter = Meter(CORTEX_M3)
-    rays = unit_vectors(undistort(pixels[order].astype(np.float32), CAMERA, meter), CAMERA, meter)
-    return Centroids(rays * np.float32([-1 if mirrored else 1, 1, 1]), listed, attitude)
-
-
 def ours(rays: Rays) -> tuple[float, Attitude | None]:
     """Time in s and attitude by profile `extended`, with equal weights."""
+    offer_firmware_loops()
     meter = Meter(CORTEX_M3)
     started = time.process_time()
     found = identify(rays, None, CATALOGUE, FIELD, meter)

@@ -134,7 +134,9 @@ class PairTriangles:
         third = catalogue.cosines.take(star * count + another)
         third = np.abs(third - cosines[rim, other]) / sines[rim, other]
         fits = ((third <= tolerance) & (rim != other) & (star != another)).nonzero()[0]
-        operations = _operations(newest, walked, len(hub), len(one), len(fits), _sizes(catalogue))
+        operations = _operations(
+            newest, walked, len(hub), len(one), len(fits), sizes=_sizes(catalogue)
+        )
         if not self._meter.charge_all(operations, self._limit):
             return None
         hubs = hub[one[fits]]
@@ -217,7 +219,7 @@ def _charges(
     """Phases and operations of a step, and the cycles of each phase and the number of each
     operation as sums (rows, 6) of 1 and what ``_operations`` depends on."""
     units = [[int(row == column) for column in range(5)] for row in range(-1, 5)]
-    each = [_operations(*unit, sizes) for unit in units]
+    each = [_operations(*unit, sizes=sizes) for unit in units]
     table = dict(cycles)
     rows: dict[str, list[int]] = {}
     for phase in each[0]:
@@ -239,7 +241,7 @@ def _sizes(catalogue: StarCatalogue) -> tuple[int, int]:
 
 
 def _operations(
-    older: int, walked: int, entries: int, wedges: int, found: int, sizes: tuple[int, int]
+    older: int, walked: int, entries: int, wedges: int, found: int, *, sizes: tuple[int, int]
 ) -> dict[str, dict[str, int]]:
     """Operations of each phase of a step of the part's program: ``older`` centroids, entries of the
     pair list ``walked`` over and kept, every two of these at one star, and triangles."""

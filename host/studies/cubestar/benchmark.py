@@ -49,6 +49,9 @@ def _figures(device: Device[CubeStarBoard, CubeStar]) -> dict[str, float]:
         client.command("StopLoop")
     figures["instructions_per_s"] = round(instructions_per_s())
     figures |= unicorn_ratios()
+    from cubestack.host.studies.cubestar.identification import identification_figures
+
+    figures |= identification_figures()
     figures["firmware_ratio"] = _firmware_ratio(device)
     figures["cold_build_s"] = round(cold_build_s(cubestar_wiring()), 1)
     return figures | _i2c()
@@ -119,6 +122,9 @@ BENCHMARK = Benchmark(
         "instructions_per_s": "of the instruction-set simulator, in an arithmetic loop",
         "unicorn_ratio": "its speed by unicorn's, over six programs, where unicorn is installed",
         "unicorn_ratio_waits": "the same with the cost of flash wait states, which unicorn lacks",
+        "identify_N_ms": "processor time of an identification alone, profile `extended`, with N "
+        "false stars",
+        "identify_N_ratio": "the time of its Python form by that, in turn in one run",
         "firmware_ratio": "as realtime_ratio, with the reference firmware on the simulator",
         "cold_build_s": "translating and compiling the FPGA with an empty cache",
         "i2c_ROUTE_fast": "byte reads a second of a program below `cubestack run`, by either route",

@@ -181,6 +181,8 @@ def test_cubestar_benchmark_reports_all_its_figures(
         monkeypatch.setattr(cubestar, name, lambda rate=rate: rate)
     monkeypatch.setattr(cubestar, "unicorn_ratios", lambda: {"unicorn_ratio": 1.5})
     monkeypatch.setattr(cubestar, "cold_build_s", lambda wiring: built(wiring, 5.678))
+    alone = "cubestack.host.studies.cubestar.identification.identification_figures"
+    monkeypatch.setattr(alone, lambda: {"identify_10_ms": 0.3})
     monkeypatch.setattr(cubestar, "_capture", lambda _emulated: {"capture_wall_ms": 1.0})
     monkeypatch.setattr(cubestar, "_i2c", lambda: {"i2c_seccomp_fast": 7.0})
     assert cubestar.BENCHMARK.run(device("cubestar")) == {
@@ -191,6 +193,7 @@ def test_cubestar_benchmark_reports_all_its_figures(
         "realtime_ratio": 4.0,
         "instructions_per_s": 4001,
         "unicorn_ratio": 1.5,
+        "identify_10_ms": 0.3,
         "firmware_ratio": 4.0,
         "cold_build_s": 5.7,
         "i2c_seccomp_fast": 7.0,
