@@ -35,16 +35,22 @@ class ValueKind:
     parse: Callable[[str], Any]  #: converts a text for ``read``; raises the same
 
 
+LARGEST_NUMBER = 1e18
+"""Of a number without limits of its own: its square and a product of some are still finite."""
+
+
 def _number(given: Any) -> float:
-    if isinstance(given, bool) or not isinstance(given, Real) or not math.isfinite(given):
+    if isinstance(given, bool) or not isinstance(given, Real) or math.isnan(given):
         raise TypeError
-    return float(given)
+    if not abs(found := float(given)) <= LARGEST_NUMBER:
+        raise TypeError
+    return found
 
 
 def _whole(given: Any) -> int:
-    if isinstance(given, bool):
+    if isinstance(given, bool) or abs(found := operator.index(given)) >> 64:
         raise TypeError
-    return operator.index(given)
+    return found
 
 
 def _integer(given: str) -> int:

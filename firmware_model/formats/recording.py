@@ -9,19 +9,35 @@ the optional last member is that of ``Setup.to_json``. Each further line is one 
 - ``{"ps", "port", "error": "framing"}``: a character that the device dropped.
 - ``{"ps", "port", "end_ps", "messages": [...], "errno"}``: a transfer on an I2C bus. A message is
   ``{"address", "write": hex}`` or ``{"address", "read": hex}``; "errno" is present if it failed.
-- ``{"ps", "control": [word, ...], "text"}``: a change of the device that did not come over a port,
-  as a shell command; "text" is the content of a file that the command names.
+- ``{"ps", "control": [word, ...], "text", "files"}``: a change of the device that did not come over
+  a port, as a shell command; "text" is the content of a file that the command names, "files" that
+  of files that the text names, in base 64 by the last part of their path.
+
+A last line that is cut off is ignored.
 """
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import IO, Any, Literal
+from typing import Any, Literal, Protocol
 
-from cubestack.firmware_model.formats.setup import Setup
+from cubestack.firmware_model.formats import untrusted
+from cubestack.firmware_model.formats.setup import Setup, files_json, files_of
 
 VERSION = 1
+
+LARGEST = 4 << 30
+"""Bytes of a recording."""
+
+LATEST_PS = 10**20
+"""Latest virtual time in ps: three years."""
+
+LONGEST_BYTE_PS = 10**15
+HIGHEST_BAUD = 12_000_000
+HIGHEST_ADDRESS, HIGHEST_ERRNO = 0x3FF, 4095
+MOST_MESSAGES, MOST_WORDS = 42, 100
+"""Of a transfer (I2C_RDWR_IOCTL_MAX_MSGS of Linux) and of a command."""
 
 Side = Literal["host", "device"]  #: the sender
 
@@ -71,11 +87,15 @@ class BusTransfer:
 
 @dataclass(frozen=True)
 class Control:
-    """The shell command ``words`` changed a device; ``text``: content of a file that it names."""
+    """The shell command ``words`` changed a device.
+
+    ``text`` is the content of a file that it names, ``files`` those that the text names.
+    """
 
     time_ps: int
     words: tuple[str, ...]
     text: str = ""
+    files: Mapping[str, bytes] = field(default_factory=dict)
 
 
 Event = LineBytes | LineError | BusTransfer | Control
@@ -119,11 +139,19 @@ class Recording:
         return max((_end_ps(event) for event in self.events), default=0)
 
 
+class TextSink(Protocol):
+    """Where lines of text go: an open file, or what stands in for one."""
+
+    def write(self, text: str, /) -> object: ...
+
+    def flush(self) -> object: ...
+
+
 class RecordingWriter:
     """Writes a recording line by line, so that an interrupted run leaves complete lines."""
 
     def __init__(
-        self, stream: IO[str], device: str, bauds: dict[str, int], setup: Setup | None = None
+        self, stream: TextSink, device: str, bauds: dict[str, int], setup: Setup | None = None
     ) -> None:
         """Write the header to ``stream``, which the caller closes."""
         self._stream = stream
@@ -155,65 +183,105 @@ def _to_json(event: Event) -> dict[str, object]:
             ]
             transfer = {"ps": time_ps, "port": port, "end_ps": end_ps, "messages": shown}
             return transfer | ({"errno": errno} if errno else {})
-        case Control(time_ps, words, text):
-            return {"ps": time_ps, "control": list(words)} | ({"text": text} if text else {})
+        case Control(time_ps, words, text, files):
+            known = {"ps": time_ps, "control": list(words)} | ({"text": text} if text else {})
+            return known | files_json(files)
 
 
 def load_recording(path: Path) -> Recording:
     """Read a recording; raises RecordingError, or OSError if the file cannot be read."""
     header: Recording | None = None
     events: list[Event] = []
-    with path.open(encoding="utf-8", errors="replace") as stream:
-        for number, text in enumerate(stream, 1):
+    for number, line in untrusted.read_lines(path, LARGEST, RecordingError):
+        try:
             try:
-                content = json.loads(text)
-                if header is None:
-                    header = _header(path, content)
-                else:
-                    events.append(_event(content))
-            except (ValueError, KeyError, TypeError) as error:
-                reason = f"lacks {error}" if isinstance(error, KeyError) else str(error)
-                raise RecordingError(
-                    f"{path} is no recording of version {VERSION}: line {number}: {reason}"
-                ) from None
+                content = untrusted.parse_json(line, "", largest=untrusted.LONGEST_LINE)
+            except untrusted.UntrustedError:
+                if header is not None and not line.endswith(b"\n"):
+                    break  # the writer was cut off
+                raise
+            if not isinstance(content, dict):
+                raise ValueError("a line must be an object")
+            if header is None:
+                header = _header(path, content)
+            else:
+                events.append(_event(content, header.bauds))
+        except (ValueError, KeyError) as error:
+            reason = f"lacks {error}" if isinstance(error, KeyError) else str(error)
+            raise RecordingError(
+                f"{path} is no recording of version {VERSION}: line {number}: {reason}"
+            ) from None
     if header is None:
         raise RecordingError(f"{path} is no recording: it is empty")
     ordered = tuple(sorted(events, key=lambda event: event.time_ps))
     return replace(header, events=ordered)
 
 
-def _header(path: Path, content: Any) -> Recording:
-    if not isinstance(content, dict) or content.get("recording") != VERSION:
+def _header(path: Path, content: dict[str, Any]) -> Recording:
+    if content.get("recording") != VERSION:
         raise ValueError("there is no header")
     lines = content["lines"]
     if not isinstance(content["device"], str) or not isinstance(lines, dict):
         raise ValueError('"device" must be a text and "lines" an object')
+    for port in lines:
+        _number(lines, port, 1, HIGHEST_BAUD)
     setup = Setup.from_json(content["setup"]) if "setup" in content else None
     return Recording(str(path), content["device"], lines, setup=setup)
 
 
-def _event(content: Any) -> Event:
-    time_ps = int(content["ps"])
+def _number(content: dict[str, Any], name: str, low: int, high: int) -> int:
+    found = content[name]
+    if type(found) is not int or not low <= found <= high:
+        raise ValueError(f'"{name}" must be a whole number in {low}..{high}, not {found!r:.40}')
+    return found
+
+
+def _string(content: dict[str, Any], name: str) -> str:
+    found = content[name]
+    if not isinstance(found, str):
+        raise ValueError(f'"{name}" must be a text, not {found!r:.40}')
+    return found
+
+
+def _list(content: dict[str, Any], name: str, kind: type, longest: int) -> list[Any]:
+    found = content[name]
+    if (
+        not isinstance(found, list)
+        or len(found) > longest
+        or not all(isinstance(one, kind) for one in found)
+    ):
+        what = "texts" if kind is str else "objects"
+        raise ValueError(f'"{name}" must be a list of at most {longest} {what}')
+    return found
+
+
+def _event(content: dict[str, Any], bauds: dict[str, int]) -> Event:
+    time_ps = _number(content, "ps", 0, LATEST_PS)
     if "control" in content:
-        words = tuple(str(word) for word in content["control"])
-        return Control(time_ps, words, str(content.get("text", "")))
-    port = str(content["port"])
+        words = tuple(_list(content, "control", str, MOST_WORDS))
+        text = _string(content, "text") if "text" in content else ""
+        return Control(time_ps, words, text, files_of(content))
+    port = _string(content, "port")
     if "messages" in content:
-        messages = tuple(_message(message) for message in content["messages"])
-        errno = int(content.get("errno", 0))
-        return BusTransfer(time_ps, port, int(content["end_ps"]), messages, errno)
+        end_ps = _number(content, "end_ps", 0, LATEST_PS)
+        messages = tuple(map(_message, _list(content, "messages", dict, MOST_MESSAGES)))
+        errno = _number(content, "errno", 0, HIGHEST_ERRNO) if "errno" in content else 0
+        return BusTransfer(time_ps, port, end_ps, messages, errno)
+    if port not in bauds:
+        raise ValueError(f"there is no line {port!r:.40}; the header has {', '.join(bauds)}")
     if "error" in content:
         return LineError(time_ps, port)
     side = content["from"]
     if side not in ("host", "device"):
-        raise ValueError(f'"from" must be "host" or "device", not {side!r}')
-    return LineBytes(time_ps, port, side, bytes.fromhex(content["data"]), int(content["byte_ps"]))
+        raise ValueError(f'"from" must be "host" or "device", not {side!r:.40}')
+    data = bytes.fromhex(_string(content, "data"))
+    return LineBytes(time_ps, port, side, data, _number(content, "byte_ps", 1, LONGEST_BYTE_PS))
 
 
-def _message(content: Any) -> BusMessage:
+def _message(content: dict[str, Any]) -> BusMessage:
     read = "read" in content
-    data = bytes.fromhex(content["read" if read else "write"])
-    return BusMessage(int(content["address"]), data, read)
+    data = bytes.fromhex(_string(content, "read" if read else "write"))
+    return BusMessage(_number(content, "address", 0, HIGHEST_ADDRESS), data, read)
 
 
 def _truncate(event: Event, end_ps: int) -> Event:

@@ -13,6 +13,7 @@ from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.firmware_model.interface.cubesense import INTERFACE
 from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
 
+TEXTS = st.text(max_size=30)
 TIMES = st.integers(0, 10**15)
 UART, I2C = st.just("uart"), st.just("i2c")
 ENDS, DATA = st.sampled_from(["host", "device"]), st.binary(min_size=1, max_size=9)
@@ -20,11 +21,14 @@ LINES = st.builds(recording.LineBytes, TIMES, UART, ENDS, DATA, st.integers(1, 1
 WORDS = st.builds(recording.BusMessage, st.integers(0, 127), st.binary(max_size=5), st.booleans())
 MESSAGES = st.lists(WORDS, max_size=3).map(tuple)
 TRANSFERS = st.builds(recording.BusTransfer, TIMES, I2C, TIMES, MESSAGES, st.integers(0, 130))
-EVENTS = LINES | TRANSFERS | st.builds(recording.LineError, TIMES, UART)
-TEXTS = st.text(max_size=30)
-DOCUMENTS = st.none() | st.builds(Document, TEXTS, TEXTS)
-OPTIONS = st.dictionaries(TEXTS, st.booleans() | st.integers() | TEXTS, max_size=3)
-SETUPS = st.builds(Setup, TEXTS, st.just(""), st.integers(0, 2**40), DOCUMENTS, DOCUMENTS, OPTIONS)
+FILES = st.dictionaries(st.sampled_from(["a.png", "b"]), st.binary(max_size=9))
+CONTROLS = st.builds(recording.Control, TIMES, st.lists(TEXTS).map(tuple), TEXTS, FILES)
+EVENTS = LINES | TRANSFERS | CONTROLS | st.builds(recording.LineError, TIMES, UART)
+DOCUMENTS = st.none() | st.builds(Document, TEXTS, TEXTS, FILES)
+OPTIONS = st.dictionaries(TEXTS, st.booleans() | st.integers(-(10**20), 10**20) | TEXTS, max_size=3)
+SETUPS = st.builds(
+    Setup, TEXTS, st.just(""), st.integers(0, 2**40), DOCUMENTS, DOCUMENTS, OPTIONS, FILES
+)
 
 
 @given(st.lists(EVENTS, max_size=8), st.none() | SETUPS)
@@ -41,7 +45,23 @@ def test_recording_events_round_trip(tmp_path_factory, events, setup):
     assert list(found.events) == sorted(events, key=lambda event: event.time_ps)
 
 
-HEADER = '{"recording": 1, "device": "x", "lines": {}}\n'
+@given(st.lists(LINES, min_size=1, max_size=5), st.data())
+def test_recording_that_was_cut_off_has_the_events_before(tmp_path_factory, events, data):
+    stream = io.StringIO()
+    writer = recording.RecordingWriter(stream, "cubestar", {"uart": 57_600})
+    ends = [len(stream.getvalue())]
+    for event in events:
+        writer.write(event)
+        ends.append(len(stream.getvalue()))
+    size = data.draw(st.integers(ends[0], ends[-1]))
+    path = tmp_path_factory.getbasetemp() / "cut.rec"
+    path.write_text(stream.getvalue()[:size], encoding="utf-8")
+    whole = sum(end <= size + 1 for end in ends) - 1  # the last one may lack its end of line
+    expected = sorted(events[:whole], key=lambda event: event.time_ps)
+    assert list(recording.load_recording(path).events) == expected
+
+
+HEADER = '{"recording": 1, "device": "x", "lines": {"uart": 1200}}\n'
 EVENT = '{"ps": 1, "port": "uart", "from": "%s", "data": "%s", "byte_ps": 1}'
 
 
@@ -49,13 +69,22 @@ EVENT = '{"ps": 1, "port": "uart", "from": "%s", "data": "%s", "byte_ps": 1}'
     ("text", "reason"),
     [
         ("", "it is empty"),
-        ("hello", "line 1: Expecting value"),
+        ("hello", "line 1: not valid JSON: Expecting value"),
         ('{"recording": 2}', "line 1: there is no header"),
         ('{"recording": 1}', "line 1: lacks 'lines'"),
-        ("[]", "line 1: there is no header"),
+        ("[]", "line 1: a line must be an object"),
         (HEADER + '{"ps": 1}', "line 2: lacks 'port'"),
         (HEADER + EVENT % ("me", ""), 'line 2: "from" must be'),
         (HEADER + EVENT % ("host", "xy"), "line 2: non-hexadecimal"),
+        (HEADER + EVENT.replace("1,", "-1,", 1) % ("host", ""), '"ps" must be a whole number in 0'),
+        (HEADER + EVENT.replace("uart", "line") % ("host", ""), "no line 'line'"),
+        (HEADER + EVENT.replace(": 1}", ": 0}") % ("host", ""), '"byte_ps" must be'),
+        (HEADER + '{"ps": 1, "control": "abc"}', '"control" must be a list'),
+        (HEADER + '{"ps": 1e400, "control": []}\n', "no finite number"),
+        (HEADER + '{"ps": 1, "control": [], "files": {"../x": ""}}', "no name of a file"),
+        (HEADER + '{"ps": 1, "control": [], "files": {"x": "?"}}', "base 64"),
+        (HEADER + "[" * 100_000 + "\n", "line 2: lists and tables are nested"),
+        (HEADER.replace("1200", "0"), '"uart" must be a whole number in 1'),
         ("\x00\xff\n" * 3, "line 1: "),
     ],
 )
