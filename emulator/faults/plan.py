@@ -15,13 +15,13 @@
     target = "memory"      # default: the first one of the device
 """
 
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from cubestack.emulator.faults.declaration import TIMES, Fault, FaultError
 from cubestack.emulator.faults.table import make_fault
+from cubestack.firmware_model.formats.untrusted import parse_toml, read_text
 from cubestack.firmware_model.values import REQUIRED, read_table, text, whole
 
 _SEED = whole(0, "seed of the random numbers", 0)
@@ -50,19 +50,14 @@ class Plan:
 def load_plan(path: Path) -> Plan:
     """Read a plan; FaultError names the file, and the invalid fault."""
     try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "not UTF-8 text"
-        raise FaultError(f"{path}: {reason}; a plan of faults is a TOML file") from None
-    return parse_plan(text, str(path))
+        return parse_plan(read_text(path, error=FaultError), str(path))
+    except OSError as error:
+        raise FaultError(f"{path}: {error.strerror}; a plan of faults is a TOML file") from None
 
 
 def parse_plan(text: str, name: str = "plan") -> Plan:
     """Read the ``text`` of a plan; FaultError as for ``load_plan``."""
-    try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise FaultError(f"{name}: {error}") from None
+    table = parse_toml(text, name, FaultError)
     seed, entries = table.pop("seed", 0), table.pop("fault", [])
     if table:
         raise FaultError(

@@ -8,6 +8,7 @@ from pathlib import Path
 from cubestack.emulator.iss import image_formats
 from cubestack.emulator.iss.file_kind import kind_of_file
 from cubestack.emulator.iss.image_formats import FormatError
+from cubestack.firmware_model.formats.untrusted import LARGEST_IMAGE, read_bytes
 
 VECTORS = 8
 """Bytes of the vector table that are checked: stack pointer and reset vector."""
@@ -89,7 +90,7 @@ def load_image(name: str | Path, memory: Memory | None = None, base: int | None 
     path, stated = _split(text)
     base = stated if base is None else base
     try:
-        data = path.read_bytes()
+        data = read_bytes(path, LARGEST_IMAGE, ImageError)
     except OSError as error:
         raise ImageError(f"{path}: {error.strerror}") from None
     if not data:

@@ -3,12 +3,12 @@
 import json
 import math
 import re
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import fields
 from pathlib import Path
 from typing import Any, TypeVar
 
+from cubestack.firmware_model.formats.untrusted import read_toml
 from cubestack.firmware_model.values import read_table, text
 
 V = TypeVar("V")
@@ -28,7 +28,7 @@ def device_keys(path: Path) -> dict[str, str]:
     A file that can not be read as TOML gives none: the reader of the scene reports the error.
     """
     try:
-        table = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        table = read_toml(Path(path))
     except (OSError, ValueError):
         return {}
     keys = dict.fromkeys(DEVICE_KEYS, text(None, "of the device"))
@@ -64,11 +64,9 @@ def read_file(path: Path, reader: Callable[[dict[str, Any]], V]) -> V:
             text starts with the file's name.
     """
     try:
-        table = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        table = read_toml(Path(path), SceneError)
     except OSError as error:
         raise SceneError(f"{path} can not be read: {error.strerror or error}") from None
-    except ValueError as error:
-        raise SceneError(f"{path} is not a TOML file: {error}") from None
     try:
         return reader(table)
     except ValueError as error:

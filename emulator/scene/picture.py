@@ -2,6 +2,7 @@
 
 import warnings
 from dataclasses import dataclass, field
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -10,9 +11,13 @@ from PIL import Image, UnidentifiedImageError
 
 from cubestack.emulator.scene.attitude import unit_quaternion
 from cubestack.emulator.scene.file import SceneError
+from cubestack.firmware_model.formats.untrusted import LARGEST_PICTURE, read_bytes, shown
 from cubestack.firmware_model.values import DeclaredValues, positive, vector, whole
 
 FORMATS = ("PNG", "JPEG", "TIFF")
+
+MOST_PIXELS = 50_000_000
+"""Four bytes each while a colour picture is converted."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,41 +80,50 @@ def load_picture(file: Path) -> NDArray[np.uint8]:
     """Grey values (rows, columns) of ``file``, read-only.
 
     Raises:
-        SceneError: the file is missing, damaged, of another format, or so large that Pillow refuses
-            it.
+        SceneError: the file is missing, damaged, of another format, or too large.
     """
     try:
+        content = read_bytes(file, LARGEST_PICTURE, SceneError)
+    except OSError as error:
+        raise SceneError(f"{file.name} can not be read: {error.strerror}") from None
+    return decode_picture(content, file.name)
+
+
+def decode_picture(content: bytes, name: str) -> NDArray[np.uint8]:
+    """As ``load_picture``, from the content of the file ``name``."""
+    try:
         with warnings.catch_warnings():
-            # Pillow reads the picture all the same, and the file is the user's own.
-            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
-            image = Image.open(file)
-        with image:
-            if image.format not in FORMATS:
-                raise SceneError(
-                    f"{file.name} is a {image.format} picture; accepted are {', '.join(FORMATS)}"
-                )
-            pixels = _grey(file, image)
+            warnings.simplefilter("ignore")  # the size is checked here
+            image = Image.open(BytesIO(content))
+            with image:
+                if image.format not in FORMATS:
+                    raise SceneError(
+                        f"{name} is a {image.format} picture; accepted are {', '.join(FORMATS)}"
+                    )
+                if image.width * image.height > MOST_PIXELS:
+                    raise SceneError(
+                        f"{name} has {image.width} x {image.height} pixels; accepted are "
+                        f"{MOST_PIXELS // 10**6} million at most"
+                    )
+                pixels = _grey(name, image)
     except SceneError:
         raise
     except UnidentifiedImageError:
-        raise SceneError(
-            f"{file.name} is not a picture; accepted are {', '.join(FORMATS)}"
-        ) from None
+        raise SceneError(f"{name} is not a picture; accepted are {', '.join(FORMATS)}") from None
     except Exception as error:  # damaged data can cause any error in Pillow's decoders
-        reason = getattr(error, "strerror", None) or error
-        raise SceneError(f"{file.name} can not be read: {reason}") from None
+        raise SceneError(f"{name} can not be read: {shown(str(error))}") from None
     pixels.flags.writeable = False
     return pixels
 
 
-def _grey(file: Path, image: Image.Image) -> NDArray[np.uint8]:
+def _grey(name: str, image: Image.Image) -> NDArray[np.uint8]:
     """8-bit grey values; colours by their luma, 16 bits by their upper 8."""
     if image.mode.startswith("I;16"):
         wide: NDArray[np.uint16] = np.asarray(image).astype(np.uint16)
         return (wide >> 8).astype(np.uint8)
     if image.mode not in ("1", "L", "LA", "P", "RGB", "RGBA", "CMYK", "YCbCr"):
         raise SceneError(
-            f"{file.name} has pixels of kind {image.mode}; accepted are 8 or 16 bits of grey, "
+            f"{name} has pixels of kind {image.mode}; accepted are 8 or 16 bits of grey, "
             "or 8 bits of each colour"
         )
     return np.array(image.convert("L"), np.uint8)

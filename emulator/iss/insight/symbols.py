@@ -3,12 +3,14 @@
 A stripped program, or one that is not an ELF file, has none; everything works without them.
 """
 
+import logging
 import os
 from bisect import bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from io import BytesIO
+from itertools import islice
 from typing import Any, TypeVar
 
 from elftools.dwarf.callframe import FDE
@@ -17,6 +19,7 @@ from elftools.elf.elffile import ELFFile
 from elftools.elf.sections import SymbolTableSection
 
 from cubestack.emulator.iss.image import Image
+from cubestack.firmware_model.formats.untrusted import shown
 
 
 @dataclass(frozen=True)
@@ -44,6 +47,12 @@ class Line:
 
 
 _Range = TypeVar("_Range", Symbol, Line)
+_T = TypeVar("_T")
+
+MOST_ENTRIES = 1_000_000
+"""Of one table; further ones are not read."""
+
+_log = logging.getLogger(__name__)
 
 
 class Symbols:
@@ -58,11 +67,13 @@ class Symbols:
     def __init__(self, elf: bytes | None) -> None:
         """Read the contents of an ELF file; None: no symbols."""
         self._elf = elf
-        self.functions: list[Symbol] = []
+        self._functions: dict[int, Symbol] = {}
         self.variables: dict[str, Symbol] = {}
         self.labels: dict[str, int] = {}
         if elf is not None:
-            self._read_symbols()
+            _intact(self._read_symbols(), "symbol table")
+        by_address = sorted(self._functions.values(), key=lambda one: one.address)
+        self.functions = list(_apart(by_address))
         self._starts = [function.address for function in self.functions]
 
     @staticmethod
@@ -106,7 +117,7 @@ class Symbols:
     @cached_property
     def rows(self) -> list[Line]:
         """The line table including statements without code of their own."""
-        return sorted(self._read_lines(), key=lambda line: line.address)
+        return sorted(_intact(self._read_lines(), "line table"), key=lambda line: line.address)
 
     @cached_property
     def _line_starts(self) -> list[int]:
@@ -115,22 +126,19 @@ class Symbols:
     @cached_property
     def frames(self) -> "list[tuple[int, int, Any]]":
         """Start, end and record of the call frame information (DWARF 4, 6.4), by start."""
-        if self._elf is None:
-            return []
-        dwarf = ELFFile(BytesIO(self._elf)).get_dwarf_info()
-        if not dwarf.has_CFI():
-            return []
-        found = [
-            (entry["initial_location"], entry["initial_location"] + entry["address_range"], entry)
-            for entry in dwarf.CFI_entries()
-            if isinstance(entry, FDE) and self.function_at(entry["initial_location"])
-        ]
-        return sorted(found, key=lambda one: one[0])
+        return sorted(_intact(self._read_frames(), "frame table"), key=lambda one: one[0])
 
-    def _read_symbols(self) -> None:
+    def _read_frames(self) -> "Iterator[tuple[int, int, Any]]":
+        dwarf = ELFFile(BytesIO(self._elf or b"")).get_dwarf_info()
+        for entry in dwarf.CFI_entries() if dwarf.has_CFI() else ():
+            if isinstance(entry, FDE) and self.function_at(start := entry["initial_location"]):
+                entry.get_decoded()  # damage shows here, not in the middle of a run
+                yield start, start + entry["address_range"], entry
+
+    def _read_symbols(self) -> Iterator[None]:
         assert self._elf is not None
         file = ELFFile(BytesIO(self._elf))
-        found: dict[int, Symbol] = {}
+        found = self._functions
         for section in file.iter_sections():
             if not isinstance(section, SymbolTableSection):
                 continue
@@ -147,7 +155,7 @@ class Symbols:
                 elif kind == "STT_OBJECT":
                     self.variables[name] = Symbol(name, value, size)
                 self.labels[name] = value
-        self.functions = list(_apart(sorted(found.values(), key=lambda one: one.address)))
+                yield
 
     def _read_lines(self) -> Iterator[Line]:
         if self._elf is None:
@@ -178,6 +186,17 @@ class Symbols:
                     file_name, statement = names.get(before.file, "?"), bool(before.is_stmt)
                     yield Line(before.address, state.address, file_name, before.line, statement)
                 before = None if state.end_sequence else state
+
+
+def _intact(entries: Iterator[_T], what: str) -> list[_T]:
+    """The entries before damaged data, of which a warning tells."""
+    found: list[_T] = []
+    try:
+        found.extend(islice(entries, MOST_ENTRIES))
+    except Exception as error:  # elftools raises various exceptions for damaged files
+        reason = shown(str(error)) or type(error).__name__
+        _log.warning("the firmware's %s is damaged: %s", what, reason)
+    return found
 
 
 def _containing(items: list[_Range], starts: list[int], address: int) -> _Range | None:

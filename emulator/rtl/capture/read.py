@@ -5,11 +5,12 @@ from pathlib import Path
 from cubestack.emulator.rtl.capture.capture import Capture, CaptureError
 from cubestack.emulator.rtl.capture.read_csv import read_csv
 from cubestack.emulator.rtl.capture.read_vcd import read_vcd
+from cubestack.firmware_model.formats.untrusted import LARGEST_FILE, opened
 
 
 def read_capture(path: Path) -> Capture:
     """Raises CaptureError for a damaged file, and OSError for one that can not be opened."""
-    with path.open("rb") as stream:
+    with opened(path, LARGEST_FILE, CaptureError) as stream:
         head = stream.read(4096)
     if not head.strip():
         raise CaptureError(f"{path} is empty")

@@ -9,6 +9,7 @@ Other programs name the unit of the times in the label: "Time [s]".
 
 import re
 from collections.abc import Iterable, Iterator
+from io import TextIOWrapper
 from itertools import chain, islice
 from pathlib import Path
 
@@ -16,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.emulator.rtl.capture.capture import Capture, CaptureError, Channel, rate_period_ps
+from cubestack.firmware_model.formats.untrusted import LARGEST_FILE, opened
 
 _UNITS_PS = {
     unit: 10.0**power
@@ -41,7 +43,8 @@ _HEAD_LINES = 1000
 
 def read_csv(path: Path) -> Capture:
     """Raises CaptureError for a file that is none or is damaged."""
-    with path.open(encoding="latin-1", newline=None) as stream:
+    with opened(path, LARGEST_FILE, CaptureError) as file:
+        stream = TextIOWrapper(file, "latin-1")
         names: list[str] = []
         period_ps: float | None = None
         labels: list[str] | None = None

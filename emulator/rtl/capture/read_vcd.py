@@ -6,7 +6,7 @@ pyvcd's reader takes a minute for a capture of 10 MB; this one splits blocks of 
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from typing import BinaryIO
+from typing import IO
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from cubestack.emulator.rtl.capture.capture import (
     Channel,
     rate_period_ps,
 )
+from cubestack.firmware_model.formats.untrusted import LARGEST_FILE, opened
 
 _BLOCK = 1 << 20
 
@@ -33,7 +34,7 @@ _IGNORED = {b"$dumpvars", b"$dumpall", b"$dumpon", b"$dumpoff", b"$end"}
 
 def read_vcd(path: Path) -> Capture:
     """Raises CaptureError for a file that is none or is damaged."""
-    with path.open("rb") as stream:
+    with opened(path, LARGEST_FILE, CaptureError) as stream:
         words = _words(stream)
         try:
             return _Reader(path).read(words)
@@ -41,7 +42,7 @@ def read_vcd(path: Path) -> Capture:
             raise CaptureError(f"{path} is no VCD file: it has no $enddefinitions") from None
 
 
-def _words(stream: BinaryIO) -> Iterator[bytes]:
+def _words(stream: IO[bytes]) -> Iterator[bytes]:
     """The words of a file, which is never whole in memory."""
     rest = b""
     while block := stream.read(_BLOCK):

@@ -59,7 +59,7 @@ def test_deprecated_plan_time_keys_still_work_with_a_warning(
         ("seed = -1", "seed must be at least 0, not -1"),
         ("speed = 1", "unknown key 'speed'; a plan has seed and"),
         ("fault = 3", r"fault must be an array of tables, \[\[fault\]\]"),
-        ("seed = ", "plan: "),
+        ("seed = ", "plan is not a TOML file: "),
         ("[[fault]]", "fault 1: needs the key kind"),
         ('[[fault]]\nkind = "ack-lost"\n[[fault]]\nkind = 3', "fault 2: kind must be text"),
         ('[[fault]]\nkind = "smoke"', "fault 1: unknown fault 'smoke'; known: uart-drop"),
