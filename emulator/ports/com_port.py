@@ -29,6 +29,9 @@ DATA_READY, HOLDING_EMPTY, SHIFT_EMPTY = 1, 32, 64
 CTS, DSR, RING, CARRIER = 16, 32, 64, 128
 """Bits of NOTIFY-MODEMSTATE; the same shifted by four to the right: it has changed."""
 
+SLOWEST_BAUD = 50
+"""The lowest rate of termios(3): one character takes 0.2 s, and so long the next client waits."""
+
 PARITIES: dict[int, Parity] = {1: "N", 2: "O", 3: "E", 4: "M", 5: "S"}
 STOP_BITS: dict[int, float] = {1: 1, 2: 2, 3: 1.5}
 
@@ -122,7 +125,8 @@ class ComPort(PortManager):  # type: ignore[misc]  # pyserial has no types
         return SIGNATURE_TEXT
 
     def _baud_rate(self, value: bytes) -> bytes:
-        self._change(baud=int.from_bytes(value, "big") or None)
+        baud = int.from_bytes(value, "big")
+        self._change(baud=baud if baud >= SLOWEST_BAUD else None)
         return self.port.form.baud.to_bytes(4, "big")
 
     def _data_size(self, value: bytes) -> bytes:

@@ -12,6 +12,7 @@ import errno
 import fcntl
 import os
 import pty
+import secrets
 import select
 import struct
 import termios
@@ -28,6 +29,9 @@ from cubestack.emulator.ports.serial_port import SerialPort
 _TERMIOS2 = struct.Struct("=4IB19s2I")  # i, o, c, l flags; line; control characters; rates
 _GET, _SET = 0x802C542A, 0x402C542B  # TCGETS2, TCSETS2
 _RATE, _OTHER_RATE, _MARK_OR_SPACE = 0o10017, 0o10000, 0o10000000000  # CBAUD, BOTHER, CMSPAR
+
+
+TERMINALS = Path("/dev/pts")
 
 
 def read_settings(terminal: int) -> bytes:
@@ -83,7 +87,7 @@ class PtyEndpoint(SerialPort):
 
         ``report`` receives one line per client whose format differs from the device's.
         """
-        if path.is_symlink() and not path.exists():
+        if _is_stale(path):
             path.unlink()
         if path.is_symlink() or path.exists():
             raise PortError(f"pty path '{path}' already exists; choose another or remove it")
@@ -208,10 +212,14 @@ class PtyEndpoint(SerialPort):
             self._openings.close()
         self._openings = _watch(self._terminal)
         self._seen = self._raw
-        new_link = self._path.with_name(f".{self._path.name}.new")
-        new_link.unlink(missing_ok=True)
-        new_link.symlink_to(self._terminal)
-        new_link.replace(self._path)
+        new_link = self._path.with_name(f".{self._path.name}.{secrets.token_hex(8)}")
+        try:
+            new_link.symlink_to(self._terminal)
+            new_link.replace(self._path)
+        except OSError as error:
+            new_link.unlink(missing_ok=True)
+            reason = f"can not be replaced: {error.strerror}; the terminal is {self._terminal}"
+            self._report(f"{self.name}: a client has locked it, and the link {reason}")
 
 
 def _watch(terminal: str) -> Openings | None:
@@ -220,6 +228,18 @@ def _watch(terminal: str) -> Openings | None:
         return Openings(terminal)
     except OSError:
         return None
+
+
+def _is_stale(link: Path) -> bool:
+    """Whether it is the link of an earlier run: its terminal is gone, or younger than the link."""
+    if not link.is_symlink():
+        return False
+    try:
+        terminal = link.readlink()
+        younger = terminal.stat().st_ctime_ns > link.lstat().st_mtime_ns
+        return terminal.parent == TERMINALS and younger
+    except FileNotFoundError:
+        return not link.exists()
 
 
 def _open_terminal(baud: int) -> tuple[int, str]:

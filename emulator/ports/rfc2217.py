@@ -63,6 +63,8 @@ class Rfc2217Endpoint(TcpEndpoint):
             self._flush()
 
     def _welcome(self) -> None:
+        if self._line.form != self._device_form:
+            self._line.uart.host_drops()  # at the rate of a client before, it may take hours
         self._line.form = self._device_form
         settings = com_port.Settings(
             form_of=lambda: self._line.form,

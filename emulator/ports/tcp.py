@@ -13,6 +13,9 @@ from cubestack.emulator.ports.serial_port import SerialPort
 TCP_RECEIVE_BUFFER = 4096
 """Bytes. Small, so that little is left to deliver of a client that floods the port and ends."""
 
+MAX_AHEAD = 8 << 20
+"""Bytes, more than a sender's buffer of Linux holds (tcp(7), tcp_wmem)."""
+
 REFUSAL = b"cubestack: this port has a client already\r\n"
 """Plain text, which contains no frame and no telnet command."""
 
@@ -21,7 +24,8 @@ class TcpEndpoint(SerialPort):
     """A listening socket that serves one client at a time; a second one is refused with a line.
 
     A client that has shut down its side still receives the device's output, but a new client
-    replaces it; bytes that the old one sent last are lost if the wire was too slow for them.
+    replaces it; bytes that the old one sent last are lost if the wire was too slow for them. Its
+    end may be behind bytes that the wire has no time for, so they are read when a new client comes.
     """
 
     scheme = "tcp"
@@ -42,6 +46,7 @@ class TcpEndpoint(SerialPort):
         self._server.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, TCP_RECEIVE_BUFFER)
         self._client: socket.socket | None = None
         self._input_ended = False
+        self._ahead = bytearray()  # read before the wire had room
         self.address: tuple[str, int] = self._server.getsockname()[:2]
         name = f"[{self.address[0]}]" if ":" in self.address[0] else self.address[0]
         self.name = f"{self.scheme}://{name}:{self.address[1]}"
@@ -52,6 +57,8 @@ class TcpEndpoint(SerialPort):
         if self._client is not None:
             # Even with no events to wait for, poll would report a client that has gone.
             events = self._events(reading=not self._input_ended)
+            if self._ahead and self._room() > 0:
+                events |= select.POLLOUT  # at once
             if events:
                 watched.append((self._client.fileno(), events))
         return watched
@@ -67,8 +74,7 @@ class TcpEndpoint(SerialPort):
         except OSError:  # no client, or it has gone again
             return self._client
         newcomer.setblocking(False)
-        # poll reports hang-ups and errors in any case.
-        if self._client is not None and not poll_now(self._client.fileno(), HUNG_UP):
+        if self._client is not None and not self._gone(self._client):
             with contextlib.suppress(OSError):
                 newcomer.send(REFUSAL)
             newcomer.close()
@@ -79,9 +85,21 @@ class TcpEndpoint(SerialPort):
         self._welcome()
         return self._client
 
+    def _gone(self, client: socket.socket) -> bool:
+        """Whether the client has shut down its side; reads ahead to find out."""
+        with contextlib.suppress(OSError):
+            while len(self._ahead) < MAX_AHEAD and (data := client.recv(MAX_AHEAD)):
+                self._ahead += data
+        # poll reports hang-ups and errors in any case.
+        return bool(poll_now(client.fileno(), HUNG_UP))
+
     def _welcome(self) -> None: ...
 
     def _read(self, max_bytes: int) -> bytes:
+        if self._ahead:
+            data = bytes(self._ahead[:max_bytes])
+            del self._ahead[:max_bytes]
+            return data
         if self._client is None or self._input_ended:
             return b""
         try:
@@ -109,6 +127,7 @@ class TcpEndpoint(SerialPort):
             self._client.close()
         self._client = None
         self._input_ended = False
+        self._ahead.clear()
         self._unread.clear()
 
 

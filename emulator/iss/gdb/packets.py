@@ -15,7 +15,7 @@ RESERVED = b"#$}*"
 """Bytes that must be escaped; ``*`` starts a repetition, in answers only."""
 
 LARGEST = 0x4000
-"""Bytes of a packet's data, as the session announces; longer packets are dropped."""
+"""Bytes of a packet's data, as the session announces; longer ones end the connection."""
 
 
 def escape(data: bytes) -> bytes:
@@ -41,18 +41,24 @@ class Deframer:
     #: acknowledgements to send; the owner clears them
     replies: bytearray = field(default_factory=bytearray)
     again: bool = False  #: whether the client requests the last packet again; the owner clears it
+    foreign: bool = False  #: whether the client speaks another protocol
     _unread: bytearray = field(default_factory=bytearray)
 
     def feed(self, data: bytes) -> Iterator[bytes | None]:
-        """Data of each complete packet, still escaped; None for an interrupt."""
+        """Data of each complete packet, still escaped; None for an interrupt.
+
+        The first byte that begins neither packet, acknowledgement nor interrupt ends it: what
+        follows may be the body of a request that a web page has sent here.
+        """
         self._unread += data
-        while self._unread:
+        while self._unread and not self.foreign:
             first = self._unread[0]
             if first == ord("$"):
                 end = self._unread.find(b"#")
+                if (len(self._unread) if end < 0 else end) > LARGEST + 1:
+                    self.foreign = True
+                    return
                 if end < 0 or len(self._unread) < end + 3:
-                    if len(self._unread) > LARGEST + 4:
-                        self._unread.clear()
                     return
                 body, checksum = bytes(self._unread[1:end]), bytes(self._unread[end + 1 : end + 3])
                 del self._unread[: end + 3]
@@ -69,3 +75,5 @@ class Deframer:
                 yield None
             elif first == ord("-"):
                 self.again = True
+            elif first != ord("+"):
+                self.foreign = True

@@ -1,7 +1,7 @@
 """A GDB client's session on a target: packets in, answers out.
 
 GDB manual, appendix "GDB Remote Serial Protocol". One thread, all-stop mode. Breakpoints of both
-kinds belong to the simulator, so their number is unlimited and none changes memory.
+kinds belong to the simulator, so none changes memory.
 """
 
 from collections.abc import Callable
@@ -25,6 +25,12 @@ FEATURES = (
 )
 WORD = 4
 
+MOST_OUTPUT = 1 << 20
+"""Bytes that wait for a client; with more, it is disconnected."""
+
+MOST_FLASHED, MOST_BREAKPOINTS, MOST_WATCHPOINTS = 4 << 20, 10_000, 1_000
+"""Of one client: bytes between vFlashWrite and vFlashDone, breakpoints and watchpoints."""
+
 
 class Session:
     """One client on one target, which it halts at the start.
@@ -44,12 +50,16 @@ class Session:
         self._last = b""
         self._flashed: dict[int, bytes] = {}
         self._breakpoints: set[tuple[int, int]] = set()  # (kind of packet, address)
+        self._watchpoints: set[tuple[int, int, int]] = set()  # and bytes
         target.attach()
 
     def receive(self, data: bytes) -> None:
         """Handle bytes from the client."""
         for body in self._packets.feed(data):
             self._flush()
+            if len(self.output) > MOST_OUTPUT:
+                self._packets.foreign = True  # it sends requests and reads no answers
+                break
             if body is None:
                 self._target.halt()
             elif not self.ended:
@@ -58,6 +68,8 @@ class Session:
             self._packets.again = False
             self.output += self._last
         self._flush()
+        if self._packets.foreign:
+            self.close()
 
     def look(self) -> None:
         """Notify the client if the target has halted."""
@@ -184,10 +196,15 @@ class Session:
         kind, address, count = (int(part, 16) for part in text.split(";")[0].split(","))
         if kind in BREAKPOINT_KINDS:
             address &= ~1
+            if on and len(self._breakpoints) >= MOST_BREAKPOINTS:
+                return ERROR
             (self._breakpoints.add if on else self._breakpoints.discard)((kind, address))
             wanted = any((one, address) in self._breakpoints for one in BREAKPOINT_KINDS)
             self._target.set_breakpoint(address, wanted)
         elif kind in WATCH_KINDS:
+            if on and len(self._watchpoints) >= MOST_WATCHPOINTS:
+                return ERROR
+            (self._watchpoints.add if on else self._watchpoints.discard)((kind, address, count))
             self._target.set_watchpoint(address, max(count, 1), WATCH_KINDS[kind], on)
         else:
             return UNKNOWN
@@ -236,6 +253,8 @@ class Session:
         return inside and self._target.write(address, b"\xff" * count)
 
     def _flash_write(self, address: str, data: bytes) -> bytes:
+        if sum(map(len, self._flashed.values())) + len(data) > MOST_FLASHED:
+            return ERROR
         self._flashed[int(address, 16)] = data
         return OK
 

@@ -77,6 +77,39 @@ def test_bytes_of_a_client_that_dies_within_a_frame_are_kept(port, device, conne
     assert_fresh(port, device, second)
 
 
+@a_tcp
+def test_flood_of_a_client_that_has_left_does_not_keep_the_next_one_out(port, device, connect):
+    """The end of its connection lies behind megabytes that the line had no time for."""
+    first = connect()
+    first.socket.setblocking(False)
+    with contextlib.suppress(BlockingIOError):
+        while True:
+            first.socket.send(bytes(1 << 16))
+    first.close()
+    port.exchange(device.kernel.now)
+    assert_fresh(port, device, connect())
+
+
+@a_tcp
+def test_client_that_floods_and_stays_keeps_its_bytes(port, device, connect):
+    """Although what it sent is read when another one comes, to find out whether it has left."""
+    first = connect()
+    first.socket.setblocking(False)
+    sent = 0
+    with contextlib.suppress(BlockingIOError):
+        while sent < 300_000:
+            sent += first.socket.send(bytes(range(250)) * 40)
+    port.exchange(device.kernel.now)
+    with contextlib.closing(open_client(port)) as second:
+        port.exchange(device.kernel.now)
+        assert second.read(10) == b"cubestack:"
+    while len(device.received) < sent:
+        before = len(device.received)
+        port.exchange(device.advance(MAX_UNSENT))
+        assert len(device.received) > before
+    assert device.received == (bytes(range(250)) * (sent // 250 + 1))[:sent]
+
+
 def test_fast_client_is_limited_to_the_line_rate(port, device, connect):
     client = connect()
     sent = bytes(i * 37 % 251 for i in range(100_000))

@@ -10,9 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cubestack.emulator.iss.gdb.packets import LARGEST, Deframer, escape, framed, unescape
+from cubestack.emulator.iss.gdb.session import MOST_BREAKPOINTS, MOST_OUTPUT, Session
 from cubestack.emulator.iss.gdb.target import REGISTERS, SIGSEGV, Stop
 
-from .fake_target import RAM, Talk
+from .fake_target import RAM, FakeTarget, Talk
 
 
 def test_packet_is_framed_with_its_checksum() -> None:
@@ -50,10 +51,41 @@ def test_byte_03_is_an_interrupt_only_between_packets() -> None:
     assert list(Deframer().feed(b"\x03" + framed(b"X0,1:\x03"))) == [None, b"X0,1:\x03"]
 
 
-def test_packet_without_end_is_dropped() -> None:
-    deframer = Deframer()
-    assert list(deframer.feed(b"$" + b"0" * (LARGEST + 8))) == []
-    assert list(deframer.feed(framed(b"?"))) == [b"?"]
+@pytest.mark.parametrize(
+    "foreign",
+    [
+        b"POST / HTTP/1.1\r\n\r\n",
+        b"\x16\x03\x01",  # TLS
+        b"+P",
+        b"$" + b"0" * (LARGEST + 8),
+    ],
+)
+def test_client_that_speaks_another_protocol_is_disconnected(foreign: bytes) -> None:
+    """What follows is not executed: a web page can send any body to any port."""
+    target = FakeTarget()
+    session = Session(target)
+    session.receive(foreign + framed(b"M20000000,4:deadbeef"))
+    session.receive(framed(b"M20000000,4:deadbeef"))
+    assert session.ended
+    assert session.output == b""
+    assert target.memory[RAM][:4] == bytes(4)
+
+
+def test_client_that_reads_no_answers_is_disconnected() -> None:
+    session = Session(FakeTarget())
+    for _ in range(2 * MOST_OUTPUT // LARGEST):
+        session.receive(framed(b"m20000000,1000") * 10)
+    assert session.ended
+    assert len(session.output) < MOST_OUTPUT + 2 * LARGEST
+
+
+def test_memory_of_a_client_is_bounded(talk: Talk) -> None:
+    block = b"0" * (LARGEST - 40)
+    answers = {talk.ask(b"vFlashWrite:%x:%b" % (at << 16, block)) for at in range(400)}
+    assert answers == {b"OK", b"E01"}
+    answers = {talk.ask(f"Z0,{2 * at:x},2") for at in range(MOST_BREAKPOINTS + 1)}
+    assert answers == {b"OK", b"E01"}
+    assert talk.ask("z0,0,2") == talk.ask("Z0,ffff0,2") == b"OK"
 
 
 @pytest.fixture
