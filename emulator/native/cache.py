@@ -12,6 +12,7 @@ import hashlib
 import logging
 import os
 import platform
+import shutil
 import stat
 import tempfile
 import time
@@ -88,18 +89,44 @@ def hash_of(content: bytes) -> str:
 def cache_folder() -> Path:
     """Folder of the libraries: ``$XDG_CACHE_HOME/cubestack``, by default below ``~/.cache``.
 
-    Where that is not writable, one among the temporary files that belongs to this user alone.
+    It belongs to this user, and nobody else can write to it. Where that is not possible, it is one
+    among the temporary files.
     """
-    base = os.environ.get("XDG_CACHE_HOME")
-    folder = (Path(base) if base else Path.home() / ".cache") / "cubestack"
+    try:
+        base = os.environ.get("XDG_CACHE_HOME")
+        folder = (Path(base) if base else Path.home() / ".cache") / "cubestack"
+    except RuntimeError:  # the user has neither $HOME nor an entry in passwd(5)
+        return _private_folder("the home folder", "is not known")
     there = next(path for path in (folder, *folder.parents) if path.exists())
-    if there.is_dir() and os.access(there, os.W_OK | os.X_OK):
-        return folder
-    return _private_folder(folder)
+    if not there.is_dir() or not os.access(there, os.W_OK | os.X_OK):
+        return _private_folder(str(folder), "can not be written to")
+    if there != folder:
+        make_folder(folder)
+    else:
+        found = folder.stat()
+        if found.st_uid != os.getuid():
+            return _private_folder(str(folder), "belongs to another user")
+        if found.st_mode & _BY_OTHERS:
+            _close_to_others(folder, found.st_mode)
+    return folder
+
+
+_BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
+
+
+def _close_to_others(folder: Path, mode: int) -> None:
+    """Make ``folder`` private, and remove what others may have put there."""
+    folder.chmod(stat.S_IMODE(mode) & ~_BY_OTHERS)
+    for path in folder.iterdir():
+        if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path, ignore_errors=True)
+        else:
+            path.unlink(missing_ok=True)
+    _log.warning("others could write to %s: it was emptied, and is closed to them now", folder)
 
 
 @cache
-def _private_folder(wanted: Path) -> Path:
+def _private_folder(wanted: str, reason: str) -> Path:
     """In place of ``wanted``; nobody else may have put a library there that we would load."""
     folder = Path(tempfile.gettempdir()) / f"cubestack-{os.getuid()}"
     with suppress(FileExistsError):
@@ -108,7 +135,7 @@ def _private_folder(wanted: Path) -> Path:
     own = stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid()
     if not own or found.st_mode & (stat.S_IRWXG | stat.S_IRWXO):
         folder = Path(tempfile.mkdtemp(prefix="cubestack-"))
-    _log.warning("%s can not be written to; what is compiled is kept in %s", wanted, folder)
+    _log.warning("%s %s; what is compiled is kept in %s", wanted, reason, folder)
     return folder
 
 
@@ -158,19 +185,26 @@ def library_of(wanted: Recipe, folder: Path | None = None) -> Path:
 
 def ready_library(wanted: Recipe, folder: Path | None = None) -> Path | None:
     """Path of a library that is shipped or in the cache, None where it must be compiled."""
-    if not os.environ.get("CXX") and (library := _intact(SHIPPED, hash_of(wanted.inputs))):
+    if not os.environ.get("CXX") and (library := intact(SHIPPED, hash_of(wanted.inputs))):
         return library
     compiler = compilers.find_compiler()
     return _found(folder or cache_folder(), wanted.key(compiler)) if compiler else None
 
 
-def _intact(folder: Path, key: str) -> Path | None:
+def make_folder(folder: Path) -> None:
+    """Create ``folder``, to which only this user can write."""
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    folder.mkdir(mode=0o700, exist_ok=True)
+
+
+def intact(folder: Path, key: str) -> Path | None:
+    """The library with ``key`` in its name whose bytes have the hash in its name."""
     files = folder.glob(f"{key}-*.so")
     return next((one for one in files if one.stem == f"{key}-{hash_of(one.read_bytes())}"), None)
 
 
 def _found(folder: Path, key: str) -> Path | None:
-    library = _intact(folder, key)
+    library = intact(folder, key)
     if library is not None:
         with suppress(OSError):
             os.utime(library)  # it is in use
@@ -178,7 +212,7 @@ def _found(folder: Path, key: str) -> Path | None:
 
 
 def _built(folder: Path, compiler: Compiler, wanted: Recipe) -> Path:
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     key = wanted.key(compiler)
     log = folder / f"{key}.log"
     with _shown(wanted, compiler), log.open("a") as turn:

@@ -60,7 +60,8 @@ def find_compiler() -> Compiler | None:
         if version_text is not None:
             return Compiler(command, f"{shlex.join(command)}\n{version_text}")
     if importlib.util.find_spec("ziglang") is not None:
-        return Compiler((sys.executable, "-m", "ziglang", "c++"), f"ziglang {version('ziglang')}")
+        command = (sys.executable, "-P", "-m", "ziglang", "c++")
+        return Compiler(command, f"ziglang {version('ziglang')}")
     return None
 
 

