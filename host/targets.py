@@ -33,7 +33,7 @@ from cubestack.host.devices.device import AnyDevice, Engine
 from cubestack.host.devices.registry import device, device_names, devices
 from cubestack.host.emulation.controls import Controls, EmulatedControls
 from cubestack.host.emulation.emulated import node_client, open_device
-from cubestack.host.emulation.records import create_file, start_recorder
+from cubestack.host.emulation.records import create_record, start_recorder
 from cubestack.host.emulation.remote_controls import controlled
 from cubestack.host.errors import NodeError, PortOpenError, TargetError
 from cubestack.host.recording.host_recorder import HostRecorder
@@ -133,7 +133,7 @@ def open_target(
     with ExitStack() as stack:
         tape = None
         if record is not None:
-            tape = HostRecorder(create_file(record, stack), taped_setup(text))
+            tape = HostRecorder(create_record(record, stack), taped_setup(text))
         if text.startswith(RECORDED):
             target = _open_recorded(text)
         else:
@@ -165,7 +165,7 @@ def _open_emulated(
         controls = EmulatedControls(emulated)
         if record is not None:
             setup = emulated_setup(seed, scene, options=options)
-            recorder = start_recorder(emulated, create_file(record, stack), setup)
+            recorder = start_recorder(emulated, create_record(record, stack), setup)
             stack.callback(recorder.close)
         lines = [board.serial(line.name) for line in board.lines]
         bus = board.i2c()

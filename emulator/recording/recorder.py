@@ -6,7 +6,7 @@ its way is not recorded, as the replayed fault does it again. The format is that
 """
 
 from collections.abc import Mapping
-from typing import IO
+from types import MappingProxyType
 
 from cubestack.emulator.bus.i2c import I2cBus, I2cError, I2cMessage, I2cTap
 from cubestack.emulator.bus.uart import Uart, UartTap
@@ -21,7 +21,11 @@ class Recorder:
     """Writes a recording; attach it before the first byte is sent."""
 
     def __init__(
-        self, stream: IO[str], device: str, uarts: Mapping[str, Uart], setup: Setup | None = None
+        self,
+        stream: rec.TextSink,
+        device: str,
+        uarts: Mapping[str, Uart],
+        setup: Setup | None = None,
     ) -> None:
         """Record ``uarts`` by the names of their ports; the caller closes ``stream``."""
         bauds = {port: uart.form.baud for port, uart in uarts.items()}
@@ -33,9 +37,15 @@ class Recorder:
     def listen(self, bus: I2cBus, port: str = "i2c") -> None:
         self._taps.append(_BusTap(self._writer, port, bus))
 
-    def control(self, time_ps: int, words: tuple[str, ...], text: str = "") -> None:
+    def control(
+        self,
+        time_ps: int,
+        words: tuple[str, ...],
+        text: str = "",
+        files: Mapping[str, bytes] = MappingProxyType({}),
+    ) -> None:
         """Record a command that reached the device outside of its ports; see ``Control``."""
-        self._writer.write(rec.Control(time_ps, words, text))
+        self._writer.write(rec.Control(time_ps, words, text, files))
 
     def flush(self) -> None:
         for tap in self._taps:

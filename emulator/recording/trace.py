@@ -15,7 +15,7 @@ Times are rounded down to 1 ns.
 import heapq
 from collections.abc import Callable, Iterable, Mapping
 from itertools import count
-from typing import IO, Any, Protocol
+from typing import Any, Protocol
 
 from vcd import VCDWriter
 
@@ -23,6 +23,7 @@ from cubestack.emulator.bus.i2c import I2cBus, I2cMessage, I2cTap
 from cubestack.emulator.bus.uart import Uart, UartTap
 from cubestack.emulator.rtl.contract import RtlEngine
 from cubestack.emulator.sim.virtual_time import Kernel
+from cubestack.firmware_model.formats.recording import TextSink
 
 PS_PER_NS = 1000
 
@@ -46,7 +47,7 @@ class VcdTrace:
 
     def __init__(
         self,
-        stream: IO[str],
+        stream: TextSink,
         device: str,
         kernel: Kernel,
         uarts: Mapping[str, Uart],

@@ -20,7 +20,7 @@ from cubestack.host.devices.registry import device_names, devices, emulated_name
 from cubestack.host.emulation.emulated import AnyEmulated, check_options
 from cubestack.host.emulation.records import (
     InsightFiles,
-    create_file,
+    create_record,
     open_gdb,
     start_recorder,
     start_trace,
@@ -211,10 +211,10 @@ def record(
     for a file that can not be written.
     """
     if args.trace is not None:
-        stack.callback(start_trace(emulated, create_file(args.trace, stack)).close)
+        stack.callback(start_trace(emulated, create_record(args.trace, stack)).close)
     if args.record is None:
         return None
-    recorder = start_recorder(emulated, create_file(args.record, stack), setup)
+    recorder = start_recorder(emulated, create_record(args.record, stack), setup)
     stack.callback(recorder.close)
     return recorder
 

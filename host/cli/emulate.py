@@ -264,6 +264,10 @@ def _report_events(emulated: AnyEmulated) -> None:
     emulated.faults.on_event = lambda event: say(str(event))
 
 
+LARGEST_HISTORY = 1 << 30
+"""Bytes of a device's history among the temporary files, without --record."""
+
+
 def _history(
     args: argparse.Namespace, opened: list[AnyEmulated], setups: Sequence[Setup], stack: ExitStack
 ) -> History | str:
@@ -275,7 +279,8 @@ def _history(
         return f"{given[0]} can't be undone" if given else "nothing is recorded"
     folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="cubestack-")))
     files = [args.record or folder / f"{one.device.name}.rec" for one in opened]
-    history = History(opened, setups, files, args.engine)
+    largest = LARGEST_HISTORY if args.record is None else None
+    history = History(opened, setups, files, args.engine, largest)
     stack.callback(history.close)
     return history
 

@@ -20,12 +20,19 @@ from contextlib import ExitStack
 
 from cubestack.emulator.recording.replay import SETTLE_PS, Replay
 from cubestack.firmware_model.formats.recording import load_recording
+from cubestack.firmware_model.formats.untrusted import shown_lines
 from cubestack.firmware_model.values import number
 from cubestack.host.cli.arguments import add_flag, add_path, add_value
-from cubestack.host.cli.device_options import add_record_arguments, add_start_arguments, record
+from cubestack.host.cli.device_options import (
+    add_board_arguments,
+    add_record_arguments,
+    add_start_arguments,
+    given_options,
+    record,
+)
 from cubestack.host.emulation.controls import EmulatedControls
 from cubestack.host.emulation.history import Recipe
-from cubestack.host.emulation.records import create_file, start_trace
+from cubestack.host.emulation.records import create_record, start_trace
 from cubestack.host.recording.setups import setup_for
 from cubestack.host.terminal import busy, say
 
@@ -37,6 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_path(parser, "--scene", "replaces the recorded one", "SCENE")
     add_start_arguments(parser, seed=None, seed_help="replaces the recorded one")
     add_record_arguments(parser)
+    add_board_arguments(parser)
     for name, what in (("trace_from", "begins"), ("trace_to", "ends")):
         add_value(parser, name, number(None, f"where --trace {what}", 0, LATEST_S, "s"))
     add_flag(parser, "--json", "print one JSON object with all differences")
@@ -47,14 +55,14 @@ def run(args: argparse.Namespace) -> int:
     recording = load_recording(args.recording)
     setup = setup_for(recording, seed=args.seed, scene=args.scene, faults=args.faults, tell=say)
     with ExitStack() as stack:
-        opened = Recipe.of(recording, setup).make(args.engine)
+        opened = Recipe.of(recording, setup, given_options(args)).make(args.engine)
         stack.callback(opened.close)
         whole = argparse.Namespace(record=args.record, trace=None if span else args.trace)
         record(whole, opened, stack, setup)
         board, act = opened.board, EmulatedControls(opened).act
         replay = Replay(recording, board.kernel, board.uarts, board.i2c_bus, act)
         if span is not None:
-            stream = create_file(args.trace, stack)
+            stream = create_record(args.trace, stack)
             board.kernel.advance_to(span[0])
             trace = start_trace(opened, stream)
             end_ps = span[1] or recording.end_ps + SETTLE_PS
@@ -67,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
         print(json.dumps({"recording": str(args.recording), "differences": differences}))
     else:
         duration_s = recording.end_ps / 1e12
-        print("\n".join(differences) or f"{duration_s:.3f} s replayed: no difference")
+        print(shown_lines("\n".join(differences)) or f"{duration_s:.3f} s replayed: no difference")
     return int(bool(differences))
 
 

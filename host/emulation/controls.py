@@ -78,12 +78,10 @@ class EmulatedControls:
             case ("fault", *words) if words:
                 self.fault(words)
             case ("scene", name):
-                with written(Document(name, control.text)) as path:
-                    try:
-                        self._emulated.scene = path
-                    except ValueError as error:
-                        raise ValueError(str(error).replace(str(path), name)) from None
-                self._emulated.on_act(control.words, control.text)
+                files = {**self._emulated.files, **control.files}
+                with written(Document(name, control.text, files)) as path:
+                    self._emulated.scene = path
+                self._emulated.on_act(control.words, control.text, self._emulated.files)
             case ("point", *words):
                 self.point(words)
             case ("power", channel, "on" | "off" as state):
@@ -108,7 +106,8 @@ class EmulatedControls:
             self._emulated.scene = path
         except FileNotFoundError:
             raise TargetError(f"no scene file {path}") from None
-        self._emulated.on_act(("scene", str(path)), read_document(path).text)
+        document = read_document(path)
+        self._emulated.on_act(("scene", document.name), document.text, document.files)
 
     def point(self, words: list[str]) -> None:
         from cubestack.emulator.scene.pointing import Pointing

@@ -31,6 +31,7 @@ from cubestack.host.devices.registry import device as registered
 from cubestack.host.devices.registry import devices, emulated_names
 from cubestack.host.emulation.firmware import ProgramExit, run_to_exit
 from cubestack.host.emulation.virtual_serial import PS_PER_S, VirtualSerial
+from cubestack.host.recording.setups import read_document
 from cubestack.host.terminal import busy
 from cubestack.host.transport.smbus import CubeSMBus
 
@@ -54,8 +55,9 @@ class EmulatedDevice(Closable, Generic[BoardT_co, ClientT_co]):
         seed: of everything random.
         chosen: its profile and the switches that differ, as keywords of ``open_device``.
         follows: what moves its scene, e.g. an orbit; empty for a scene that stays as set.
-        on_act: called after each recorded action from outside of the ports, with the shell's words
-            and the text of the file they name.
+        files: contents of the files that its scene file names, by the last part of their path.
+        on_act: called after each recorded action from outside of the ports, with the shell's words,
+            the text of the file they name, and the files that the text names.
     """
 
     device: Device[BoardT_co, ClientT_co]
@@ -63,9 +65,10 @@ class EmulatedDevice(Closable, Generic[BoardT_co, ClientT_co]):
     seed: int
     chosen: Mapping[str, str] = field(default_factory=dict)
     follows: str = field(default="", init=False)
-    on_act: Callable[[tuple[str, ...], str], None] = field(
-        default_factory=lambda: lambda _words, _text: None, init=False, repr=False
+    on_act: Callable[..., None] = field(
+        default_factory=lambda: lambda *_what: None, init=False, repr=False
     )
+    files: Mapping[str, bytes] = field(default_factory=dict, repr=False)
     _client: ClientT_co | None = field(default=None, init=False, repr=False)
 
     @property
@@ -102,6 +105,7 @@ class EmulatedDevice(Closable, Generic[BoardT_co, ClientT_co]):
             if value != self.chosen.get(key, ""):
                 raise ValueError(f"{scene}: {key} can only be chosen at power-up")
         self.board.scene = self.device.scene(scene)
+        self.files = scene_files(scene)
 
     def point(
         self,
@@ -330,6 +334,11 @@ def scene_options(device: AnyDevice, scene: Any) -> dict[str, str]:
     return found
 
 
+def scene_files(scene: Any) -> Mapping[str, bytes]:
+    """Contents of the files that a scene file names; empty if ``scene`` is not its path."""
+    return read_document(Path(scene)).files if isinstance(scene, str | Path) else {}
+
+
 def power_up(
     device: Device[BoardT_co, ClientT_co],
     scene: Any = None,
@@ -359,7 +368,7 @@ def power_up(
         board = device.open_board(device.scene(scene), seed=seed, engine=engine, **options)
     if board.firmware:
         chosen["firmware"] = board.firmware
-    return EmulatedDevice(device, board, seed, chosen)
+    return EmulatedDevice(device, board, seed, chosen, files=scene_files(scene))
 
 
 def open_device(

@@ -3,10 +3,12 @@ their recordings replayed."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from types import MappingProxyType
 from typing import Any
 
 from cubestack.emulator.faults.plan import Plan, parse_plan
@@ -19,9 +21,10 @@ from cubestack.firmware_model.formats.setup import Setup
 from cubestack.host.devices.device import AnyDevice, Engine
 from cubestack.host.devices.registry import device
 from cubestack.host.emulation.controls import EmulatedControls
-from cubestack.host.emulation.emulated import AnyEmulated, power_up
-from cubestack.host.emulation.records import create_file, start_recorder
-from cubestack.host.recording.setups import written
+from cubestack.host.emulation.emulated import AnyEmulated, power_up, scene_files
+from cubestack.host.emulation.records import create_record, start_recorder
+from cubestack.host.recording.record_file import RecordFile
+from cubestack.host.recording.setups import split_mark, written
 from cubestack.host.terminal import say
 
 
@@ -31,14 +34,26 @@ class Recipe:
 
     device: AnyDevice
     scene: Any
+    files: Mapping[str, bytes]
     plan: Plan | None
     setup: Setup
     baud: int | None
     options: dict[str, Any]
 
     @classmethod
-    def of(cls, recording: Recording, setup: Setup) -> Recipe:
-        """From a recording's header and ``setup``; raises ValueError for unknown options."""
+    def of(
+        cls,
+        recording: Recording,
+        setup: Setup,
+        given: Mapping[str, Any] = MappingProxyType({}),
+        *,
+        own: bool = False,
+    ) -> Recipe:
+        """From a recording's header and ``setup``, with the options ``given`` in place of its own.
+
+        Files that the recording names and does not contain are opened if it is this process's
+        ``own``. Raises ValueError for such files, and for unknown options.
+        """
         found = device(recording.device)
         options: dict[str, Any] = dict(setup.options)
         made = recording.setup
@@ -50,20 +65,57 @@ class Recipe:
         unknown = options.keys() - {option.name for option in found.all_options}
         if unknown:
             raise ValueError(f"{recording.name}: its setup has an unknown option {min(unknown)!r}")
+        if not own:
+            options = {name: one for name, one in options.items() if name not in given}
+            _check_names(recording.name, found, options, setup.files)
+        options |= given
         with nullcontext() if setup.scene is None else written(setup.scene) as path:
             scene = found.scene(path)
+            files = scene_files(path)
         faults = setup.faults
         plan = None if faults is None else parse_plan(faults.text, faults.name)
-        return cls(found, scene, plan, setup, next(iter(recording.bauds.values()), None), options)
+        baud = next(iter(recording.bauds.values()), None)
+        return cls(found, scene, files, plan, setup, baud, options)
 
     def make(self, engine: Engine, **more: Any) -> AnyEmulated:
         """Power it up with its fault plan; ``more`` are keywords of ``power_up``."""
         options = self.options | more
         seed, baud = self.setup.seed, self.baud
-        made = power_up(self.device, self.scene, seed=seed, engine=engine, baud=baud, **options)
+        with TemporaryDirectory(prefix="cubestack-") as folder:
+            for name, content in self.setup.files.items():
+                (Path(folder) / name).write_bytes(content)
+            here = {
+                one.name: str(Path(folder) / path.name) + mark
+                for one in self.device.all_options
+                if one.is_file and (value := options.get(one.name))
+                for path, mark in [split_mark(str(value))]
+                if path.name in self.setup.files
+            }
+            given = {"seed": seed, "engine": engine, "baud": baud}
+            made = power_up(self.device, self.scene, **given, **options | here)
+        made.files = self.files
+        made.chosen = {name: str(options.get(name, one)) for name, one in made.chosen.items()}
         if self.plan is not None:
             made.faults.load(self.plan)
         return made
+
+
+def _check_names(
+    recording: str, found: AnyDevice, options: Mapping[str, Any], files: Mapping[str, bytes]
+) -> None:
+    """Raise ValueError for an option that names a file or folder that is not in it."""
+    for one in found.all_options:
+        value = options.get(one.name, "")
+        if not isinstance(value, str):
+            if one.metavar:
+                raise ValueError(f"{recording}: {one.name} must be a text, not {value!r:.40}")
+            continue
+        names = any(word in one.metavar for word in ("FILE", "FOLDER"))
+        if not names or value in ("", *one.known):
+            continue
+        if not one.is_file or split_mark(value)[0].name not in files:
+            text = f"names the {one.name} {value!r}, which it does not contain"
+            raise ValueError(f"{recording} {text}; {one.flag} gives it")
 
 
 @dataclass
@@ -71,6 +123,7 @@ class _Kept:
     """A device's file."""
 
     path: Path
+    file: RecordFile
     recorder: Recorder
     stack: ExitStack
 
@@ -95,11 +148,13 @@ class History:
         setups: Sequence[Setup],
         paths: Sequence[Path],
         engine: Engine = "auto",
+        largest: int | None = None,
     ) -> None:
         """Record ``devices``, set up by ``setups``, in files; call it before any port opens.
 
-        Raises ValueError for a file that cannot be written.
+        A file ends at ``largest`` bytes. Raises ValueError for one that cannot be written.
         """
+        self._largest = largest
         self.devices = devices
         self.on_arrival: Callable[[AnyEmulated], None] = lambda _made: None
         self._engine = engine
@@ -114,8 +169,12 @@ class History:
         return [EmulatedControls(one) for one in self.devices]
 
     def file(self, number: int) -> Path:
-        self._kept[number].recorder.flush()
-        return self._kept[number].path
+        """The recording of a device up to now; raises ValueError if it had to stop."""
+        kept = self._kept[number]
+        kept.recorder.flush()
+        if kept.file.stopped:
+            raise ValueError(f"the history is not whole: {kept.file.stopped}")
+        return kept.path
 
     def begin_again(self, end_ps: int) -> None:
         """Power all devices up again at time 0 of their kernel, and replay.
@@ -125,7 +184,7 @@ class History:
         """
         recordings = [load_recording(self.file(number)) for number in range(len(self.devices))]
         begun = [one.until(end_ps) for one in recordings]
-        recipes = [Recipe.of(one, one.setup or Setup("")) for one in begun]
+        recipes = [Recipe.of(one, one.setup or Setup(""), own=True) for one in begun]
         paths = [one.path for one in self._kept]
         self.arrive()
         kernel = self.devices[0].board.kernel
@@ -169,9 +228,10 @@ class History:
 
     def _keep(self, made: AnyEmulated, setup: Setup, path: Path) -> _Kept:
         with ExitStack() as stack:
-            recorder = start_recorder(made, create_file(path, stack), setup)
+            file = create_record(path, stack, self._largest)
+            recorder = start_recorder(made, file, setup)
             stack.callback(recorder.close)
-            return _Kept(path, recorder, stack.pop_all())
+            return _Kept(path, file, recorder, stack.pop_all())
 
 
 def _replay(

@@ -22,7 +22,7 @@ def emulating(
     """
     theirs, ours = os.pipe()
     process = subprocess.Popen(
-        [sys.executable, "-m", "cubestack", "emulate", *words, "--lifeline", str(theirs)],
+        [sys.executable, "-P", "-m", "cubestack", "emulate", *words, "--lifeline", str(theirs)],
         stdin=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,

@@ -10,16 +10,19 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 from cubestack.host.emulation.emulated import AnyEmulated
+from cubestack.host.recording.record_file import RecordFile
+from cubestack.host.recording.setups import option_files
 
 if TYPE_CHECKING:
     from cubestack.emulator.iss.insight.observer import Observer
     from cubestack.emulator.ports.gdb import GdbEndpoint
     from cubestack.emulator.recording.recorder import Recorder
     from cubestack.emulator.recording.trace import VcdTrace
+    from cubestack.firmware_model.formats.recording import TextSink
     from cubestack.firmware_model.formats.setup import Setup
 
 
-def start_recorder(emulated: AnyEmulated, stream: IO[str], setup: Setup | None = None) -> Recorder:
+def start_recorder(emulated: AnyEmulated, stream: TextSink, setup: Setup | None = None) -> Recorder:
     """Record every byte of all ports, and actions from outside of them.
 
     Call it before any port opens.
@@ -30,14 +33,20 @@ def start_recorder(emulated: AnyEmulated, stream: IO[str], setup: Setup | None =
 
     board = emulated.board
     if setup is not None:
-        setup = replace(setup, options={**setup.options, **emulated.chosen})
+        options = {**setup.options, **emulated.chosen}
+        named = {
+            one.name: options[one.name]
+            for one in emulated.device.all_options
+            if one.is_file and options.get(one.name, "") not in ("", *one.known)
+        }
+        setup = replace(setup, options=options, files={**option_files(named), **setup.files})
     recorder = Recorder(stream, emulated.device.name, board.uarts, setup)
     recorder.listen(board.i2c_bus)
-    emulated.on_act = lambda words, text: recorder.control(board.kernel.now, words, text)
+    emulated.on_act = lambda *what: recorder.control(board.kernel.now, *what)
     return recorder
 
 
-def start_trace(emulated: AnyEmulated, stream: IO[str]) -> VcdTrace:
+def start_trace(emulated: AnyEmulated, stream: TextSink) -> VcdTrace:
     """Trace lines, buses, FPGA pins and firmware variables into a VCD file."""
     from cubestack.emulator.recording.trace import VcdTrace
 
@@ -67,6 +76,13 @@ def create_file(path: Path, stack: ExitStack) -> IO[str]:
         return stack.enter_context(path.open("w", encoding="utf-8", newline=""))
     except OSError as error:
         raise ValueError(f"can not write {path}: {error.strerror}") from None
+
+
+def create_record(path: Path, stack: ExitStack, largest: int | None = None) -> RecordFile:
+    """As ``create_file``, for what goes on for as long as the emulation does."""
+    file = RecordFile(create_file(path, stack), largest)
+    stack.callback(file.flush)
+    return file
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
+from cubestack.firmware_model.formats.setup import files_json
+from cubestack.firmware_model.formats.untrusted import LARGEST_FILE, parse_json
 from cubestack.host.emulation.controls import spoken
 from cubestack.host.errors import PortOpenError, TargetError, TransportError
 from cubestack.host.recording.setups import read_document
@@ -47,7 +49,11 @@ class ControlClient:
 
         Raises ValueError if the request was rejected, TransportError if nobody answers.
         """
-        told: dict[str, Any] = json.loads(self.fetch(method, path, body))
+        told = parse_json(
+            self.fetch(method, path, body), self.url, TransportError, largest=LARGEST_FILE
+        )
+        if not isinstance(told, dict):
+            raise TransportError(f"{self.url}{path}: the answer is no object")
         return told
 
     def fetch(self, method: str, path: str, body: object = None) -> bytes:
@@ -60,8 +66,9 @@ class ControlClient:
                 method, path, None if body is None else json.dumps(body), self._headers
             )
             answer = connection.getresponse()
-            content = answer.read()
-            error = json.loads(content).get("error", "") if answer.status >= HTTP_ERRORS else ""
+            content = answer.read(LARGEST_FILE)
+            told = parse_json(content, "") if answer.status >= HTTP_ERRORS else {}
+            error = told.get("error", "") if isinstance(told, dict) else "it failed"
         except ConnectionRefusedError:
             raise PortOpenError(f"no control port answers at {self.url}") from None
         except (OSError, http.client.HTTPException, ValueError) as failure:
@@ -105,7 +112,8 @@ class RemoteControls:
     def scene(self, path: Path) -> None:
         """See ``Controls``; the file is read here."""
         document = read_document(path)
-        self._act("scene", document.name, text=document.text)
+        files = files_json(document.files)
+        self._act("scene", document.name, text=document.text, **files)
 
     def point(self, words: list[str]) -> None:
         self._act("point", *words)
@@ -133,8 +141,8 @@ class RemoteControls:
     def _state(self) -> dict[str, Any]:
         return self.client.ask("GET", "/state")
 
-    def _act(self, *words: str, text: str = "") -> None:
-        body = {"words": list(words), "text": text}
+    def _act(self, *words: str, text: str = "", **files: Any) -> None:
+        body = {"words": list(words), "text": text, **files}
         self.client.ask("POST", f"/devices/{self.device}/act", body)
 
 

@@ -8,9 +8,10 @@ time. As a target (``recorded:FILE``) both kinds of recording work alike.
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import IO, Any
+from typing import Any
 
 from cubestack.firmware_model.formats import recording
+from cubestack.firmware_model.formats.recording import TextSink
 from cubestack.firmware_model.formats.setup import Setup
 from cubestack.host.clients.i2c import I2cBus
 from cubestack.host.transport.streams import Transport
@@ -26,7 +27,7 @@ class HostRecorder:
 
     def __init__(
         self,
-        stream: IO[str],
+        stream: TextSink,
         setup: Setup | None = None,
         *,
         clock_ns: Callable[[], int] = time.monotonic_ns,

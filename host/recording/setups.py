@@ -1,13 +1,22 @@
 """Set-up of a recorded device, from and to command options."""
 
+import re
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib.metadata import version
 from pathlib import Path
 
 from cubestack.firmware_model.formats.recording import Recording
 from cubestack.firmware_model.formats.setup import Document, Option, Setup
+from cubestack.firmware_model.formats.untrusted import (
+    LARGEST_PICTURE,
+    confined,
+    parse_toml,
+    read_bytes,
+    read_text,
+    shown,
+)
 
 DISTRIBUTION = "cubestack"
 
@@ -79,28 +88,61 @@ def _chosen(
 
 
 def read_document(path: Path) -> Document:
-    """A file's name and text for a recording; raises ValueError if it cannot be read."""
+    """A file's name and text for a recording, with the picture that it names, if any.
+
+    Raises ValueError if it cannot be read.
+    """
     try:
-        return Document(str(path), path.read_text(encoding="utf-8", errors="replace"))
+        text = read_text(path)
+        return Document(str(path), text, _named_files(path, text))
     except OSError as error:
-        raise ValueError(f"can not read {path}: {error.strerror}") from None
+        raise ValueError(f"can not read {error.filename or path}: {error.strerror}") from None
+
+
+def _named_files(path: Path, text: str) -> dict[str, bytes]:
+    named = parse_toml(text, str(path)).get("file")
+    if not isinstance(named, str):
+        return {}
+    picture = path.parent / named
+    content = read_bytes(picture, LARGEST_PICTURE)
+    return {picture.name: content} if len(content) <= LARGEST_RECORDED else {}
+
+
+def option_files(options: Mapping[str, Option]) -> dict[str, bytes]:
+    """Contents of the files that ``options`` name, without those that are missing or too large."""
+    files = {}
+    for value in options.values():
+        path, _ = split_mark(str(value))
+        with suppress(OSError, ValueError):
+            files[path.name] = read_bytes(path, LARGEST_RECORDED)
+    return files
+
+
+def split_mark(value: str) -> tuple[Path, str]:
+    """The path in an option's value, and what follows it: an address, a hash."""
+    found = _MARK.search(value)
+    assert found is not None
+    return Path(value[: found.start()]), found[0]
+
+
+_MARK = re.compile(r"(@(0[xX][0-9a-fA-F]+|[0-9]+))?(#[0-9a-f]{8,64})?$")
+
+LARGEST_RECORDED = 32 << 20
+"""Bytes of a file that becomes part of a recording."""
 
 
 @contextmanager
 def written(document: Document) -> Iterator[Path]:
-    """A file with a document's text: the original if unchanged, else a copy.
+    """A file with a document's text, beside the files that came with it.
 
-    Files that the text names are found only beside the original.
+    Within the block no other file can be read. Errors name the document.
     """
-    path = Path(document.name)
-    try:
-        same = path.read_text(encoding="utf-8", errors="replace") == document.text
-    except OSError:
-        same = False
-    if same:
-        yield path
-        return
-    with tempfile.TemporaryDirectory(prefix="cubestack-") as folder:
-        copy = Path(folder) / (path.name or "recorded")
-        copy.write_text(document.text, encoding="utf-8")
-        yield copy
+    with tempfile.TemporaryDirectory(prefix="cubestack-") as folder, confined(Path(folder)):
+        copy = Path(folder) / "document"
+        try:
+            for name, content in document.files.items():
+                (Path(folder) / name).write_bytes(content)
+            copy.write_text(document.text, encoding="utf-8")
+            yield copy
+        except ValueError as error:
+            raise ValueError(str(error).replace(str(copy), shown(document.name))) from None
