@@ -4,7 +4,7 @@
 """
 
 import asyncio
-import json
+import math
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass, field
@@ -22,6 +22,8 @@ from starlette.responses import JSONResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from cubestack.firmware_model.formats.setup import files_of
+from cubestack.firmware_model.formats.untrusted import parse_json
 from cubestack.host.ground import scenes
 from cubestack.host.ground.emulation import Emulation, JsonObject
 from cubestack.host.ground.guard import refusal, refused
@@ -95,8 +97,10 @@ def _words(value: list[Any]) -> list[str]:
     return value
 
 
-def _act(emulation: Emulation, device: str, words: list[Any], text: str) -> JsonObject:
-    emulation.act(device, _words(words), text)
+def _act(
+    emulation: Emulation, device: str, words: list[Any], text: str, files: JsonObject
+) -> JsonObject:
+    emulation.act(device, _words(words), text, files_of({"files": files}))
     return emulation.state()
 
 
@@ -187,7 +191,7 @@ CALLS = (
     Call(
         *("POST", "/devices/{device}/act", "the shell's commands fault, scene, point, power, pin"),
         _act,
-        {"words": (list, REQUIRED), "text": (str, "")},
+        {"words": (list, REQUIRED), "text": (str, ""), "files": (dict, {})},
     ),
 )
 
@@ -214,7 +218,7 @@ def control_app(emulation: Emulation) -> Starlette:
 async def _answer(emulation: Emulation, call: Call, request: Request) -> Response:
     try:
         body = await request.body()
-        given = json.loads(body) if body else _query(request, call)
+        given = parse_json(body, "the body") if body else _query(request, call)
         values = call.values(given) | request.path_params
         answer = await _in_emulation(emulation, partial(call.act, emulation, **values))
         if isinstance(answer, Future):
@@ -227,14 +231,18 @@ async def _answer(emulation: Emulation, call: Call, request: Request) -> Respons
         if isinstance(answer, tuple):
             return Response(await asyncio.to_thread(_start_of, *answer), media_type="text/plain")
         return JSONResponse(answer)
-    except (ValueError, RuntimeError) as error:
+    except (ValueError, RuntimeError, ArithmeticError) as error:
         return refusal(error)
 
 
 def _query(request: Request, call: Call) -> JsonObject:
     """Numbers in the query of a GET; raises ValueError for other values."""
     given = request.query_params if call.method == "GET" else {}
-    return {name: float(value) for name, value in given.items() if name in call.takes}
+    numbers = {name: float(value) for name, value in given.items() if name in call.takes}
+    for name, value in numbers.items():
+        if not math.isfinite(value):
+            raise ValueError(f"{name!r} of {call.path} must be a finite number, not {value}")
+    return numbers
 
 
 def _start_of(path: Path, count: int) -> bytes:
@@ -252,7 +260,7 @@ async def _events(emulation: Emulation, socket: WebSocket) -> None:
         every_s = float(socket.query_params.get("every_s", EVERY_S))
     except ValueError:
         every_s = EVERY_S
-    every_s = min(max(every_s, SHORTEST_S), LONGEST_S) if every_s == every_s else EVERY_S
+    every_s = min(max(every_s, SHORTEST_S), LONGEST_S) if math.isfinite(every_s) else EVERY_S
     await socket.accept()
     closed = asyncio.create_task(_until_closed(socket))
     sent = dict.fromkeys((one.device.name for one in emulation.emulated), 0)

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 from zlib import crc32
 
@@ -141,15 +142,23 @@ class Emulation:
         pins = self.of(device).pins
         return {"pins": {pin: {"level": pins[pin], "output": pins.output(pin)} for pin in pins}}
 
-    def act(self, device: str, words: Sequence[str], text: str = "") -> None:
+    def act(
+        self,
+        device: str,
+        words: Sequence[str],
+        text: str = "",
+        files: Mapping[str, bytes] = MappingProxyType({}),
+    ) -> None:
         """Execute a shell command; ``text`` is the content of the file that it names.
+
+        ``files`` are those that the text names; no others are opened.
 
         Raises ValueError for an invalid command, RuntimeError while going back in time.
         """
         self.of(device)
         if not isinstance(self.past, str) and self.past.again:
             raise RuntimeError("the emulation is going back in time; wait until it arrives")
-        self._controls[device].act(Control(self.port.kernel.now, tuple(words), text))
+        self._controls[device].act(Control(self.port.kernel.now, tuple(words), text, files))
 
     def run_to(self, to_s: float) -> "Future[int]":
         """Run to a time as fast as possible and hold; done on arrival."""

@@ -2,7 +2,6 @@
 
 import asyncio
 import base64
-import json
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
@@ -18,11 +17,12 @@ from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from cubestack.firmware_model.formats.untrusted import parse_json
 from cubestack.host.errors import HostError
 from cubestack.host.ground import relays
 from cubestack.host.ground.emulation import JsonObject
 from cubestack.host.ground.emulators import UploadedFile
-from cubestack.host.ground.guard import refusal, refused
+from cubestack.host.ground.guard import LARGEST_BODY, refusal, refused
 from cubestack.host.ground.relays import forward, recording, results_table, transcript_table
 from cubestack.host.ground.session import TargetSession
 
@@ -112,12 +112,13 @@ async def _opened(session: "Future[TargetSession]") -> TargetSession:
 
 async def _answer(handler: Any, session: TargetSession, request: Request) -> Response:
     try:
-        body = json.loads(await request.body() or b"{}") or dict(request.query_params)
+        content = await request.body() or b"{}"
+        body = parse_json(content, "the body", largest=LARGEST_BODY) or dict(request.query_params)
         if not isinstance(body, dict):
             raise ValueError("the body must be a JSON object")
         answer = await handler(session, body, request.path_params)
         return answer if isinstance(answer, Response) else JSONResponse(answer)
-    except (ValueError, RecursionError, HostError) as error:
+    except (ValueError, ArithmeticError, HostError) as error:
         return refusal(error)
 
 
@@ -226,14 +227,14 @@ async def _live(session: TargetSession, socket: WebSocket) -> None:
     """Send updates to a tab until it disconnects."""
     await socket.accept()
     subscription, logged, restarts = Subscription(), 0, session.restarts
-    receiving = asyncio.create_task(socket.receive_json())
+    receiving = asyncio.create_task(_message(socket))
     clock = asyncio.get_running_loop().time
     try:
         while True:
             begin_s = clock()
             if receiving.done():
                 subscription = _subscription(receiving.result(), session)
-                receiving = asyncio.create_task(socket.receive_json())
+                receiving = asyncio.create_task(_message(socket))
             if session.restarts != restarts:
                 logged, restarts = 0, session.restarts
             update: JsonObject = {"link": session.health, "restarts": restarts}
@@ -261,6 +262,10 @@ async def _live(session: TargetSession, socket: WebSocket) -> None:
         await socket.close(INVALID_MESSAGE)
     finally:
         receiving.cancel()
+
+
+async def _message(socket: WebSocket) -> Any:
+    return parse_json(await socket.receive_text(), "the message")
 
 
 def _emulation(session: TargetSession, logged: int) -> JsonObject:
@@ -296,7 +301,7 @@ def _subscription(message: object, session: TargetSession) -> Subscription:
     if not isinstance(show, list) or not isinstance(every_s, int | float):
         raise ValueError("'show' must be a list of names, 'every_s' a number")
     known = {one.name for one in session.target.interface.telemetries}
-    names = [name for name in show if name in known][:MOST_SHOWN]
+    names = [name for name in show if isinstance(name, str) and name in known][:MOST_SHOWN]
     results = bool(message.get("results")) and "results" not in session.about["missing"]
     return Subscription(names, results, min(max(float(every_s), SHORTEST_S), LONGEST_S))
 

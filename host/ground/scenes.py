@@ -44,11 +44,8 @@ def present(emulated: AnyEmulated) -> JsonObject:
 def look(emulated: AnyEmulated, table: Mapping[str, Any]) -> JsonObject:
     """The ``sight`` of a scene, without applying it; raises ValueError for an invalid table."""
     form = _form(emulated.device)
-    with written(Document(FILE, text_of(table))) as path:
-        try:
-            view = emulated.device.load_scene(path)
-        except ValueError as error:
-            raise ValueError(str(error).replace(str(path), FILE)) from None
+    with written(Document(FILE, text_of(table), emulated.files)) as path:
+        view = emulated.device.load_scene(path)
     return {"sight": form.sky_map(view, emulated.board.kernel.now).as_dict()}
 
 

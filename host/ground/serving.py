@@ -20,25 +20,60 @@ MOST_CONNECTIONS = 64
 """Most connections at once, so that clients can not slow down the emulation."""
 
 REQUEST_S = 5.0
-"""Time-out of a connection's first request, wall time in s."""
+"""Time-out of the head of a request, wall time in s."""
+
+AUTHORISED = "cubestack.authorised"
+"""Key that `Guard` adds to the scope of a request that it passes on."""
 
 LARGEST_MESSAGE = 1 << 20
 """Longest message on a WebSocket in bytes."""
 
 
 class _Connection(H11Protocol):
-    """Closes excess connections, and those without a request."""
+    """Closes connections whose requests do not arrive, and excess ones that nobody authorised."""
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         super().connection_made(transport)
+        self._since = self.loop.time()
+        self._deadline: asyncio.TimerHandle | None = None
+        self._await_request()
         if len(self.connections) > MOST_CONNECTIONS:
-            transport.abort()
-            return
-        self.loop.call_later(REQUEST_S, self._expire)
+            own = (one for one in self.connections if isinstance(one, _Connection))
+            waiting = [one for one in own if not one._authorised]
+            min(waiting, key=lambda one: one._since, default=self).transport.abort()
+
+    def data_received(self, data: bytes) -> None:
+        super().data_received(data)
+        if not self._idle or not self.conn.trailing_data[0]:
+            self._cancel_deadline()
+        elif self._deadline is None:  # a part of a request's head
+            self._await_request()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._cancel_deadline()
+        super().connection_lost(exc)
+
+    @property
+    def _idle(self) -> bool:
+        """Whether no request is being answered."""
+        cycle, scope = vars(self)["cycle"], vars(self)["scope"]  # their types exclude None
+        return scope is None if cycle is None else bool(cycle.response_complete)
+
+    @property
+    def _authorised(self) -> bool:
+        return not self._idle and AUTHORISED in self.scope
+
+    def _await_request(self) -> None:
+        self._deadline = self.loop.call_later(REQUEST_S, self._expire)
+
+    def _cancel_deadline(self) -> None:
+        if self._deadline is not None:
+            self._deadline.cancel()
+        self._deadline = None
 
     def _expire(self) -> None:
-        idle = vars(self)["scope"] is None  # its declared type excludes None
-        if idle and not self.transport.is_closing():
+        self._deadline = None
+        if self._idle and not self.transport.is_closing():
             self.transport.abort()
 
 

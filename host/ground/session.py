@@ -310,12 +310,7 @@ class TargetSession:
     def _execute(self, line: str) -> JsonObject:
         if len(line) > LONGEST_LINE:
             raise ShellError(f"a line has {LONGEST_LINE} characters at most")
-        word = line.split(maxsplit=1)[0] if line.split() else ""
-        if word in self._shell.commands and word not in PAGE_COMMANDS:
-            raise ShellError(
-                f"{word} is not available on the page; available: {', '.join(PAGE_COMMANDS)}"
-            )
-        result = self._shell.execute(line)
+        result = self._shell.execute(line, PAGE_COMMANDS)
         return {"rows": result.rows if result else [], "data": result.data if result else {}}
 
     def _read(self, name: str) -> JsonObject:

@@ -86,6 +86,6 @@ class Trace:
             with self.recording.open("rb") as stream:
                 recording.write_bytes(stream.read(self.count))
             span = ["--trace-from", repr(self.from_s), "--trace-to", repr(self.to_s)]
-            call = [sys.executable, "-m", "cubestack", "replay", str(recording)]
+            call = [sys.executable, "-P", "-m", "cubestack", "replay", str(recording)]
             self.bench.run([*call, "--trace", str(waveform), *span])
             return waveform.read_bytes()

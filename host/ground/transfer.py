@@ -1,14 +1,12 @@
 """Image transfers over the wire: progress, pause, cancel."""
 
 import threading
-import warnings
 from collections.abc import Callable
-from io import BytesIO
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
+from cubestack.emulator.scene.picture import decode_picture
 from cubestack.host.clients.contract import Progress
 from cubestack.host.errors import HostError
 from cubestack.host.ground.emulation import JsonObject
@@ -87,11 +85,4 @@ class Transfer:
 
 def grey_values(content: bytes) -> NDArray[np.uint8]:
     """Grey values (rows, columns) of an image file; raises ValueError for any other file."""
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
-            image = Image.open(BytesIO(content))
-        with image:
-            return np.asarray(image.convert("L"))
-    except (OSError, Image.DecompressionBombError) as error:
-        raise ValueError(f"not an image file: {error}") from None
+    return decode_picture(content, "the uploaded file")

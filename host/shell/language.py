@@ -6,7 +6,7 @@ device's failure raises the client's errors.
 """
 
 import shlex
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import TypeVar
 
 from cubestack.firmware_model.interface.codec.field import suggestion
@@ -47,8 +47,10 @@ class Shell:
         ]
         self.commands = {command.name: command for command in commands}
 
-    def execute(self, line: str) -> CommandResult | None:
+    def execute(self, line: str, available: Sequence[str] | None = None) -> CommandResult | None:
         """Run one command; None for an empty line or a comment (#).
+
+        ``available`` are the only commands that run, all without it.
 
         Raises ShellError, InterfaceError, TransportError, NodeError. If the node has never
         answered, the error includes the likely cause.
@@ -62,6 +64,8 @@ class Shell:
         name, *arguments = words
         if name not in self.commands:
             raise ShellError(f"no command {name!r}; {suggestion(name, list(self.commands))}")
+        if available is not None and name not in available:
+            raise ShellError(f"{name} is not available here; available: {', '.join(available)}")
         command = self.commands[name]
         if command.emulated_only and self.target.controls is None:
             where = f"{self.target.name} is not emulated here"

@@ -3,6 +3,7 @@ import json
 import resource
 import socket
 from collections.abc import Iterator
+from http import HTTPStatus
 
 import pytest
 from websockets.exceptions import ConnectionClosedError, InvalidStatus
@@ -129,6 +130,68 @@ def test_many_connections_do_not_block_the_emulation(controlled: Controlled, cou
                 break
             watching.recv(SOON_S)
     assert answered(controlled)
+
+
+@pytest.mark.parametrize(
+    "request_head",
+    [b"", b"POST /pause HTTP/1.1\r\nHost: localhost\r\nContent-Length: 9999\r\n\r\n"],
+)
+def test_connections_without_the_token_keep_nobody_out(
+    controlled: Controlled, request_head: bytes
+) -> None:
+    """More than the server accepts, each with a request that never ends."""
+    held = []
+    for _ in range(2 * MOST_CONNECTIONS):
+        raw = socket.create_connection(controlled.serving.address, SOON_S)
+        raw.sendall(request_head)
+        held.append(raw)
+        assert answered(controlled)
+    for raw in held:
+        raw.close()
+
+
+def test_rejected_request_ends_its_connection(controlled: Controlled) -> None:
+    with socket.create_connection(controlled.serving.address, SOON_S) as raw:
+        raw.sendall(b"POST /pause HTTP/1.1\r\nHost: localhost\r\nContent-Length: 9999\r\n\r\n")
+        content = b""
+        while data := raw.recv(1 << 16):
+            content += data
+    assert content.startswith(b"HTTP/1.1 401")
+    assert b"content-security-policy" in content
+
+
+@pytest.mark.parametrize("host", ["[", "[::1", "]", "localhost:99999999", "a b"])
+def test_impossible_host_is_rejected_with_our_headers(controlled: Controlled, host: str) -> None:
+    for headers in ({}, BEARER):
+        connection = http.client.HTTPConnection(*controlled.serving.address, timeout=SOON_S)
+        connection.request("GET", "/state", headers=headers | {"Host": host})
+        answer = connection.getresponse()
+        assert answer.status in (HTTPStatus.MISDIRECTED_REQUEST, HTTPStatus.OK, 400, 401)
+        assert answer.getheader("x-content-type-options") == "nosniff"
+        answer.read()
+        connection.close()
+
+
+@pytest.mark.parametrize("path", ["//evil.example/", "///evil.example", "/%5Cevil.example"])
+def test_address_with_token_leads_to_this_server_only(controlled: Controlled, path: str) -> None:
+    connection = http.client.HTTPConnection(*controlled.serving.address, timeout=SOON_S)
+    connection.request("GET", f"{path}?token={TOKEN.replace(' ', '%20')}")
+    location = connection.getresponse().getheader("location", "")
+    assert location.startswith("/")
+    assert location[1:2] not in ("/", "\\")
+    connection.close()
+
+
+def test_cookie_is_not_the_token(controlled: Controlled) -> None:
+    connection = http.client.HTTPConnection(*controlled.serving.address, timeout=SOON_S)
+    connection.request("GET", f"/?token={TOKEN.replace(' ', '%20')}")
+    name, _, value = (
+        connection.getresponse().getheader("set-cookie", "").partition(";")[0].partition("=")
+    )
+    connection.close()
+    assert value != TOKEN
+    assert controlled.ask("GET", "/state", headers={"Cookie": f"{name}={TOKEN}"})[0] == 401
+    assert controlled.ask("GET", "/state", headers={"Authorization": f"Bearer {value}"})[0] == 401
 
 
 def answered(controlled: Controlled) -> bool:

@@ -79,6 +79,6 @@ def test_cancelled_transfer_ends_after_a_block(held: bool) -> None:
 
 
 def test_upload_rejects_data_that_is_no_image() -> None:
-    with pytest.raises(ValueError, match="not an image file"):
+    with pytest.raises(ValueError, match="the uploaded file is not a picture"):
         grey_values(b"GIF89a and no more")
     assert np.array_equal(grey_values(png(np.eye(3, dtype=np.uint8))), np.eye(3))
