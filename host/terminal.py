@@ -12,6 +12,8 @@ from rich.measure import Measurement
 from rich.table import Table
 from rich.text import Text
 
+from cubestack.firmware_model.formats.untrusted import shown_lines
+
 console = Console()
 _errors = Console(stderr=True)
 
@@ -45,7 +47,8 @@ def hush(quiet: bool) -> None:
 
 
 def say(text: str) -> None:
-    _errors.print(text, markup=False, highlight=False, soft_wrap=True)
+    """Print a line on standard error, with escapes for characters that a terminal would obey."""
+    _errors.print(shown_lines(text), markup=False, highlight=False, soft_wrap=True)
 
 
 def tell(text: str) -> None:
@@ -54,7 +57,7 @@ def tell(text: str) -> None:
     On a terminal it appears above the progress bar.
     """
     above = _open[0].console if _open and console.is_terminal else console
-    above.print(text, markup=False, soft_wrap=True)
+    above.print(shown_lines(text), markup=False, soft_wrap=True)
 
 
 def head(title: str) -> None:
@@ -73,6 +76,8 @@ def show(table: Table) -> None:
     options = console.options.update(max_width=_WIDEST)
     width = Measurement.get(console, options, table).maximum
     if console.is_terminal and width <= console.width:
+        for column in table.columns:
+            column._cells = [_visible(cell) for cell in column._cells]
         console.print(table)
         return
     if table.title is not None:
@@ -88,7 +93,11 @@ def show(table: Table) -> None:
 
 
 def _on_one_line(cell: RenderableType) -> RenderableType:
-    return cell.replace("\n", "  ") if isinstance(cell, str) else cell
+    return _visible(cell.replace("\n", "  ") if isinstance(cell, str) else cell)
+
+
+def _visible(cell: RenderableType) -> RenderableType:
+    return shown_lines(cell) if isinstance(cell, str) else cell
 
 
 def progress_bar() -> bars.Progress:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.firmware_model.formats.untrusted import read_json
 from cubestack.host.errors import CameraFileError
 
 INVERSION_STEPS = 100
@@ -77,11 +78,9 @@ def load_camera(path: Path) -> Camera:
     CameraFileError (a ValueError).
     """
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = read_json(path, CameraFileError)
     except OSError as error:
         raise CameraFileError(f"{path}: {error.strerror}; give a JSON camera file") from error
-    except ValueError as error:
-        raise CameraFileError(f"{path}: not JSON: {error}") from error
     keys = content.get("camera", content) if isinstance(content, dict) else content
     if not isinstance(keys, dict):
         raise CameraFileError(f"{path}: must hold an object with f_px, cx_px, cy_px")

@@ -15,6 +15,7 @@ import json
 from pathlib import Path
 
 from cubestack.firmware_model.formats.recording import load_recording
+from cubestack.firmware_model.formats.untrusted import shown
 from cubestack.host.cli.arguments import add_flag, add_path
 from cubestack.host.devices.registry import device
 from cubestack.host.recording.transcript import TABLES, TranscriptEntry, transcript
@@ -34,7 +35,7 @@ def run(args: argparse.Namespace) -> int:
         _write(args.out, messages)
         say(f"wrote {len(messages)} messages to {args.out}")
     for one in messages if args.out is None else ():
-        print(json.dumps(_object(one)) if args.json else _line(one))
+        print(json.dumps(_object(one)) if args.json else shown(_line(one)))
     return 0
 
 

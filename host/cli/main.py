@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from importlib.metadata import version
 from io import TextIOWrapper
 
+from cubestack.firmware_model.formats.untrusted import shown_lines
 from cubestack.host.cli.arguments import Parser
 from cubestack.host.cli.commands import BUILT_IN, Listed, commands, reports, with_headings
 from cubestack.host.devices.registry import device_names
@@ -118,18 +119,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         return FAILED
     except ValueError as error:  # all bad input is a ValueError with a full sentence
-        print(f"cubestack {args.command}: {error}", file=sys.stderr)
+        print(f"cubestack {args.command}: {shown_lines(str(error))}", file=sys.stderr)
         return WRONG_CALL
     except OSError as error:
         named = f"{error.filename}: {error.strerror}" if error.filename else error
-        print(f"cubestack {args.command}: {named}", file=sys.stderr)
+        print(f"cubestack {args.command}: {shown_lines(str(named))}", file=sys.stderr)
         return FAILED
     except RuntimeError as error:
         from cubestack.emulator.native.compiler import CompilerError
 
         if not isinstance(error, CompilerError):
             raise
-        print(f"cubestack {args.command}: {error}", file=sys.stderr)
+        print(f"cubestack {args.command}: {shown_lines(str(error))}", file=sys.stderr)
         return FAILED
 
 

@@ -22,6 +22,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from cubestack.firmware_model.formats.untrusted import read_text, shown_lines
 from cubestack.host.cli.arguments import add_flag, add_path
 from cubestack.host.cli.device_options import add_target_arguments, open_any_target
 from cubestack.host.errors import HostError
@@ -72,7 +73,7 @@ def _lines(args: argparse.Namespace) -> list[str] | None:
     if args.script is None:
         return None
     try:
-        return list(args.script.read_text(encoding="utf-8").splitlines())
+        return list(read_text(args.script).splitlines())
     except (OSError, UnicodeDecodeError) as error:
         raise ValueError(f"can not read script {args.script}: {error}") from None
 
@@ -96,7 +97,7 @@ def split_commands(text: str) -> Iterator[str]:
 def _show_text(result: CommandResult) -> None:
     width = max((len(name) for name, _ in result.rows), default=0)
     for name, text in result.rows:
-        print(f"{name:<{width}}  {text}" if name else text)
+        print(shown_lines(f"{name:<{width}}  {text}" if name else text))
 
 
 def _interactive(shell: Shell, show: Callable[[CommandResult], None]) -> int:

@@ -3,7 +3,6 @@
 A VCD file has a JSON file about it beside it; the failure is where the waveform ends.
 """
 
-import json
 import os
 import shutil
 import subprocess
@@ -13,6 +12,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from vcd.reader import TokenKind, VCDParseError, tokenize
+
+from cubestack.firmware_model.formats.untrusted import LARGEST_FILE, opened, read_json
 
 #: Programs that show a waveform, the first one installed is taken.
 VIEWERS = ("gtkwave", "surfer")
@@ -82,7 +83,7 @@ def read(path: Path, count: int = 20, internal: bool = False) -> Trace:
     changes: dict[str, str] = {}
     unit, time = 1, 0
     try:
-        with path.open("rb") as stream:
+        with opened(path, LARGEST_FILE) as stream:
             for token in tokenize(stream):
                 if token.kind is TokenKind.SCOPE:
                     scopes.append(token.scope.ident)
@@ -124,7 +125,7 @@ def _lines(trace: Trace) -> Iterator[str]:
 def _about(path: Path) -> dict[str, str]:
     """What the test wrote about it; nothing for a file from elsewhere."""
     try:
-        about = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
+        about = read_json(path.with_suffix(".json"))
     except (OSError, ValueError):
         return {}
     return {str(key): str(value) for key, value in about.items()}

@@ -20,7 +20,6 @@ examples:
   cubestack measure cubestar --mag-limit 3.8 --layout 2       one SRAM for FPGA and processor
 """
 
-import json
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -34,6 +33,7 @@ from numpy.typing import NDArray
 from cubestack.emulator.boards.cubestar.board import CubeStarBoard
 from cubestack.emulator.camera.mlx75412.lens import CONDITION
 from cubestack.emulator.scene.sky import PictureScene, SkyScene
+from cubestack.firmware_model.formats.untrusted import read_json
 from cubestack.firmware_model.interface.cubestar import INTERFACE, IdMode, MatchMode, TaskStatus
 from cubestack.firmware_model.interface.cubestar.codes import Reason
 from cubestack.firmware_model.values import REQUIRED, ValueKind, choice, declare, number, whole
@@ -227,7 +227,7 @@ def _picture_truth(image: Path, camera: Path | None) -> NDArray[np.float64] | No
     """Attitude of an image, from the "images" object of its camera file, if any."""
     if camera is None:
         return None
-    content = json.loads(camera.read_text(encoding="utf-8"))
+    content = read_json(camera, CameraFileError)
     try:
         quaternion = content["images"][image.name]["quaternion_xyzw_inertial_to_camera"]
     except (KeyError, TypeError):  # a camera file may lack the image

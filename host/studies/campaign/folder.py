@@ -15,6 +15,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
+from cubestack.firmware_model.formats.untrusted import parse_json, read_json, read_lines
 from cubestack.host.emulation.emulated import AnyEmulated
 from cubestack.host.export.parquet import arrow as pyarrow
 from cubestack.host.studies.campaign.block import Row, frames_of, measured, perform, rows_of
@@ -22,6 +23,18 @@ from cubestack.host.studies.campaign.plan import CampaignPlan, FrameBlock
 from cubestack.host.studies.workers import performed
 
 PLAN, ROWS = "campaign.json", "rows.jsonl"
+
+
+LARGEST_ROWS = 64 << 30
+"""Bytes of the rows of a campaign, which are read line by line."""
+
+KINDS = {
+    **dict.fromkeys(("block", "row", "seed", "after"), int),
+    "swept": dict,
+    **dict.fromkeys(("outcome", "reason"), str),
+    "result": dict,
+}
+"""Type of each member of a row."""
 
 
 class FolderError(ValueError):
@@ -41,7 +54,7 @@ class Folder:
         """Open an existing folder; raises FolderError if it has no campaign."""
         self.path = path
         try:
-            told = json.loads((path / PLAN).read_text("utf-8"))
+            told = read_json(path / PLAN)
             self.plan, self.version = CampaignPlan(**told["plan"]), str(told["version"])
         except FileNotFoundError:
             raise FolderError(f"{path} is no campaign's folder: it has no {PLAN}") from None
@@ -89,12 +102,13 @@ class Folder:
             yield
 
     def rows(self) -> Iterator[Row]:
-        """All rows so far, without a torn last line."""
+        """All rows so far, without a torn last line; FolderError names a damaged one."""
+        path = self.path / ROWS
         try:
-            with (self.path / ROWS).open(encoding="utf-8") as file:
-                for line in file:
-                    if line.endswith("\n"):
-                        yield Row(**json.loads(line))
+            for number, line in read_lines(path, LARGEST_ROWS, FolderError):
+                if line.endswith(b"\n"):
+                    where = f"{path}, line {number}"
+                    yield _row(parse_json(line, where, FolderError, finite=False), where)
         except FileNotFoundError:
             return
 
@@ -121,6 +135,15 @@ class Folder:
 
     def sort(self) -> None:
         _replace(self.path / ROWS, map(_line, sorted(self.rows(), key=lambda row: row.key)))
+
+
+def _row(content: Any, where: str) -> Row:
+    if not isinstance(content, dict) or content.keys() != KINDS.keys():
+        raise FolderError(f"{where}: a row has {', '.join(KINDS)}")
+    for name, kind in KINDS.items():
+        if type(content[name]) is not kind:
+            raise FolderError(f"{where}: {name} must be {kind.__name__}, not {content[name]!r}")
+    return Row(**content)
 
 
 def _line(row: Row) -> str:

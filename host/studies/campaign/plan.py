@@ -8,16 +8,17 @@ every combination is a point, and ``[random]`` with what is drawn anew for each 
 All points use the same skies and the same drawn values, so that they differ only by their options.
 """
 
-import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib import resources
 from itertools import product
+from math import prod
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 
+from cubestack.firmware_model.formats.untrusted import read_text, read_toml
 from cubestack.firmware_model.values import REQUIRED, whole
 from cubestack.hdl.user.source import rebased
 from cubestack.host.devices.registry import device as registered
@@ -27,6 +28,9 @@ from cubestack.host.options import Options
 
 FRAMES = 100
 """Frames per block: a device is powered up, and its threshold searched, once per block."""
+
+MOST_FRAMES, MOST_POINTS = 100_000_000, 100_000
+"""Of a point, and of the grid."""
 
 DECIDED = ("frames", "seed")
 """Options of `measure` that the plan sets."""
@@ -52,11 +56,11 @@ class CampaignPlan(Options):
     """A campaign; attributes are keys of its file."""
 
     device: str  #: what is measured
-    frames: int = whole(REQUIRED, "at each point of the grid", 1)
+    frames: int = whole(REQUIRED, "at each point of the grid", 1, MOST_FRAMES)
     #: `measure`, or another one of the device that takes ``frames`` and ``seed``
     command: str = MEASURE
     seed: int = whole(0, "of everything random", 0)
-    block: int = whole(FRAMES, "frames for which the device is powered up once", 1)
+    block: int = whole(FRAMES, "frames for which the device is powered up once", 1, MOST_FRAMES)
     options: Values = field(default_factory=dict)  #: of the command, for all frames
     #: values of options; every combination is measured
     grid: Mapping[str, list[Any]] = field(default_factory=dict)
@@ -71,6 +75,8 @@ class CampaignPlan(Options):
         for name, values in self.grid.items():
             if not isinstance(values, list) or not values:
                 raise ValueError(f"grid.{name} must be a list of values, not {values!r}")
+        if prod(map(len, self.grid.values())) > MOST_POINTS:
+            raise ValueError(f"grid must have at most {MOST_POINTS} points")
         for name, draw in self.random.items():
             _check_draw(name, draw)
         given = [*self.options, *self.grid, *self.random]
@@ -94,7 +100,7 @@ class CampaignPlan(Options):
             OSError: it can not be read.
         """
         try:
-            table = tomllib.loads(path.read_text(encoding="utf-8"))
+            table = read_toml(path)
             known = list(cls.__dataclass_fields__)
             for key in table:
                 if key not in known:
@@ -205,7 +211,7 @@ def known_plans() -> dict[str, Path]:
 
 def summary(path: Path) -> str:
     """A plan's purpose: the comment on its first line."""
-    first, _, _ = path.read_text("utf-8").partition("\n")
+    first, _, _ = read_text(path).partition("\n")
     return first.removeprefix("#").strip() if first.startswith("#") else ""
 
 

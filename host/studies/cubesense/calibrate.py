@@ -25,6 +25,7 @@ from cubestack.emulator.camera.ov7620.scene_file import load_earth_sun_scene
 from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
 from cubestack.emulator.scene.earth import angular_radius_deg
 from cubestack.emulator.scene.picture import load_picture
+from cubestack.firmware_model.formats.untrusted import read_text
 from cubestack.firmware_model.interface.cubesense.codes import PIXELS_PER_DEGREE, Camera, Sram
 from cubestack.firmware_model.interface.cubesense.telecommands import DISTORTION
 from cubestack.firmware_model.values import choice, whole
@@ -234,7 +235,7 @@ def _photographed(folder: Path, angles: Path, tables: Fisheye) -> FisheyeFit:
     """Fit to images of lights; raises ValueError with the wrong line or image."""
     pixels, known = [], []
     try:
-        lines = list(csv.DictReader(angles.read_text(encoding="utf-8").splitlines()))
+        lines = list(csv.DictReader(read_text(angles).splitlines()))
     except OSError as error:
         raise ValueError(f"{angles} can not be read: {error.strerror}") from None
     for number, line in enumerate(lines, start=2):

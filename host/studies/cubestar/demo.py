@@ -16,6 +16,7 @@ from cubestack.emulator.scene.attitude import (
     quaternion_from_pointing,
 )
 from cubestack.firmware_model.cubestar.detection.background_search import MOST_STARS_FACTOR
+from cubestack.firmware_model.formats.untrusted import read_json
 from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitches
 from cubestack.host.calibration.camera import load_camera
 from cubestack.host.clients.cubestar.client import Attitude, CubeStar
@@ -87,7 +88,7 @@ def _photograph(folder: Path | None) -> _Subject:
     camera = None if folder is None else folder / "truth.json"
     if folder is None or camera is None or not camera.is_file():
         return _shipped()
-    images = json.loads(camera.read_text(encoding="utf-8"))["images"]
+    images = read_json(camera)["images"]
     name = next(name for name in sorted(images) if (folder / name).is_file())
     picture = (folder / name).resolve()
     return _Subject(

@@ -1,6 +1,5 @@
 """A scenario of power cuts: commands to a device, and questions about what it remembers."""
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
@@ -8,6 +7,7 @@ from pathlib import Path
 from typing import Self
 
 from cubestack.emulator.iss.brown_out import FALLING_V, SUPPLY_V, dip_of
+from cubestack.firmware_model.formats.untrusted import read_toml
 from cubestack.firmware_model.values import (
     REQUIRED,
     TABLE,
@@ -133,7 +133,7 @@ class Scenario(DeclaredValues):
             OSError: it cannot be read.
         """
         try:
-            given = tomllib.loads(path.read_text(encoding="utf-8"))
+            given = read_toml(path)
             return cls(**read_table(given, cls.declared()))
         except ValueError as error:
             raise ScenarioError(f"{path}: {error}") from None

@@ -104,7 +104,7 @@ HEAD = 'device = "cubestar"\nframes = 1\n'
         ('device = "cubestar"', "frames is missing"),
         ("frames = 1", "device is missing"),
         ('device = "nobody"\nframes = 1', "no device 'nobody'; known: cubestar"),
-        ('device = "cubestar"\nframes = 0', "frames must be at least 1, not 0"),
+        ('device = "cubestar"\nframes = 0', "frames must be 1 to 100000000, not 0"),
         ('device = "cubestar"\nframe = 1', "no key 'frame' here; known: device, frames"),
         (HEAD + "[grid]\nfalse_star = [1]", "no option 'false_star'"),
         (HEAD + "[grid]\nfalse_stars = [1, -2]", "false_stars = -2"),
