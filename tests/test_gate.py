@@ -28,7 +28,6 @@ OWN = {
     "emulator/i2cdev/seccomp/supervisor.py": "/proc, and a file in memory",
     "emulator/iss/benchmark.py": "a program that it has compiled",
     "emulator/native/cache.py": "our sources, and libraries whose hash it checks",
-    "emulator/native/inner_loops.py": "our sources",
     "emulator/ports/pseudo_terminal.py": "a terminal that it has made",
     "emulator/rtl/capture/read_csv.py": "lines of a file that the gate has opened",
     "emulator/rtl/cxxrtl/build.py": "headers of a package",
