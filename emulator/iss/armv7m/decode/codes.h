@@ -69,8 +69,8 @@ struct Operation {
     uint8_t in_it;          // the same in an IT block: most 16-bit instructions set no flags
     uint8_t d, n, m, a;
     uint32_t value;
-    uint8_t halves : 2;     // its length in half-words
     uint8_t stall : 1;      // the preceding instruction computes its address
+    uint8_t halves : 2;     // its length in half-words
     uint8_t across : 1;     // 32 bits across two words: a branch here takes one cycle more
     uint8_t shift;
     uint16_t list;

@@ -51,8 +51,9 @@
             now += 2 - behind + page.read_wait; \
         } else { \
             r[15] = PC, cycles = now + 1 - behind; \
-            LOAD_OR_FAIL(address, bytes, value, privileged()); \
-            value = (uint32_t)(type)value; \
+            uint32_t content;    /* `value` stays in a register */ \
+            LOAD_OR_FAIL(address, bytes, content, privileged()); \
+            value = (uint32_t)(type)content; \
             now = cycles + 1; \
         } \
         load_end = now; \
