@@ -49,8 +49,6 @@ def supply(bench: Console) -> None:
 
 
 def pulses(bench: Console) -> None:
-    bench.run_for(2 * MS)
-    assert bench.log() == "CMU.PCNTCTRL is kept, but does nothing"  # the counter always has a clock
     started(bench)
     for _ in range(25):
         for level in (1, 0):

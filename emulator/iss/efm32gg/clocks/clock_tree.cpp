@@ -16,6 +16,9 @@ static constexpr int TUNING_STEP = 3;
 #define HIGH(unit) {&instance::unit, HFPERCLKEN0, HFPERCLKEN0_##unit, false, -1, 0, 0},
 #define CORE(unit) {&instance::unit, HFCORECLKEN0, HFCORECLKEN0_##unit, false, -1, 0, 0},
 #define LOW(unit) {&instance::unit, HFCORECLKEN0, HFCORECLKEN0_LE, true, -1, 0, 0},
+#define PULSE(unit) \
+    {&instance::unit, HFCORECLKEN0, HFCORECLKEN0_LE, true, -1, PCNTCTRL_##unit##CLKEN, \
+     PCNTCTRL_##unit##CLKSEL},
 #define LOW_A(unit) \
     {&instance::unit, HFCORECLKEN0, HFCORECLKEN0_LE, true, 0, LFACLKEN0_##unit, LFAPRESC0_##unit},
 #define LOW_B(unit) \
@@ -27,7 +30,7 @@ const Cmu::Enable Cmu::UNITS[] = {
     HIGH(TIMER2) HIGH(TIMER3) HIGH(ACMP0) HIGH(ACMP1) HIGH(I2C0) HIGH(I2C1) HIGH(GPIO) HIGH(VCMP)
     HIGH(PRS) HIGH(ADC0) HIGH(DAC0)
     CORE(DMA) CORE(AES) CORE(EBI)
-    LOW(WDOG) LOW(BURTC) LOW(PCNT0) LOW(PCNT1) LOW(PCNT2)
+    LOW(WDOG) LOW(BURTC) PULSE(PCNT0) PULSE(PCNT1) PULSE(PCNT2)
     LOW_A(LESENSE) LOW_A(RTC) LOW_A(LETIMER0)
     LOW_B(LEUART0) LOW_B(LEUART1)
 };
@@ -35,6 +38,7 @@ const Cmu::Enable Cmu::UNITS[] = {
 #undef HIGH
 #undef CORE
 #undef LOW
+#undef PULSE
 #undef LOW_A
 #undef LOW_B
 
@@ -126,9 +130,16 @@ Rate Cmu::unit_rate(const Instance &instance) const {
         const uint32_t exponent = field(effective[enable.synced + 1], enable.prescaler);
         return clock.divided((int64_t)1 << exponent, clock.origin);
     }
+    if (enable.enable && (!(reg(PCNTCTRL) & enable.enable) || clocked_by_pin(instance))) return Rate();
     if (enable.low_energy) return part.rate(Clock::LFA);
     if (!enabled(instance)) return Rate();
     return part.rate(enable.offset == HFPERCLKEN0 ? Clock::HFPER : Clock::HFCORE);
+}
+
+bool Cmu::clocked_by_pin(const Instance &instance) const {
+    const Enable &enable = enable_of(instance);
+    const uint32_t both = enable.enable | enable.prescaler;
+    return (reg(PCNTCTRL) & both) == both;
 }
 
 void Cmu::check_limits() {

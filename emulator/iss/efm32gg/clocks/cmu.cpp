@@ -81,7 +81,7 @@ void Cmu::write(uint32_t offset, uint32_t value) {
     if (locked_register(offset)) return report_locked();
     switch (offset) {
     case CTRL: case HFCORECLKDIV: case HFPERCLKDIV: case HFRCOCTRL: case LFRCOCTRL:
-    case AUXHFRCOCTRL: case LFCLKSEL: case HFCORECLKEN0: case HFPERCLKEN0:
+    case AUXHFRCOCTRL: case LFCLKSEL: case HFCORECLKEN0: case HFPERCLKEN0: case PCNTCTRL:
         if (reg(offset) != value)
             part.change_clocks([&] { store(offset, value); });
         check_limits();

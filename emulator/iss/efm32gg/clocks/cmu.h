@@ -20,6 +20,8 @@ public:
     // The clock tree as the registers select it; rates begin at `now`.
     void rates(Rates &rates, int64_t now) const;
     Rate unit_rate(const Instance &instance) const;
+    // Whether each rising edge at the first input of this pulse counter is its clock.
+    bool clocked_by_pin(const Instance &instance) const;
     bool enabled(const Instance &instance) const;
     // Whether a unit's registers are behind HFPERCLK.
     bool on_slow_bus(const Instance &instance) const;
@@ -58,7 +60,8 @@ private:
         uint32_t offset, mask;         // of its enable bit; 0: always on
         bool low_energy;
         int synced;                    // of its LF clock: index into `effective`, or -1
-        uint32_t enable, prescaler;    // masks in `effective`
+        uint32_t enable, prescaler;    // masks in `effective`; of pulse counters: enable and
+                                       // select bits in PCNTCTRL
     };
     static const Enable UNITS[];
     mutable const Instance *last = nullptr;

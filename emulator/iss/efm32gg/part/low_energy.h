@@ -61,6 +61,11 @@ protected:
     virtual uint32_t merge_commands(uint32_t older, uint32_t newer) const { return older | newer; }
     // The clock that synchronizes writes.
     virtual Rate synchronizer() const { return clock_now(); }
+    // An edge of a clock that has no rate.
+    void clock_edge() {
+        if (synchronizing.tick())
+            on_synchronized(part.now());
+    }
 
 private:
     static constexpr int MOST = 24;

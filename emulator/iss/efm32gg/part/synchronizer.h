@@ -32,6 +32,9 @@ public:
         count(clock);
     }
 
+    // An edge of a clock without a rate. Returns whether it was the last one to wait for.
+    bool tick() { return left && !rate.runs() && --left == 0; }
+
     // Forgets the write, or reports that it took effect.
     void clear() {
         part.cancel(event);

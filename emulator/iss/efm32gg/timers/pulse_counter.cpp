@@ -1,5 +1,7 @@
 // PCNT: counts edges at its first input, in the direction given by CTRL or by its second input.
-// EFM32GG Reference Manual, chapter 24. Not modelled: quadrature, filter, auxiliary counter.
+// EFM32GG Reference Manual, chapter 24. With LFACLK it counts each pulse, also one that is shorter
+// than a clock. Not modelled: quadrature, filter, auxiliary counter.
+#include "efm32gg/clocks/cmu.h"
 #include "efm32gg/part/low_energy.h"
 #include "efm32gg/pins/gpio.h"
 #include "efm32gg/pins/prs.h"
@@ -26,6 +28,12 @@ public:
             edge(level);
     }
 
+    void clocks_changed() override {
+        LowEnergy::clocks_changed();
+        if (part.cmu->clocked_by_pin(instance))
+            listen();
+    }
+
 private:
     const int signals;
     bool listening = false;
@@ -46,10 +54,14 @@ private:
             part.log_once("%s: quadrature decoding is not modelled", instance.name);
         if (reg(CTRL) & CTRL_RSTEN)
             reg(CNT) = 0, reg(TOP) = 0xFF;
-        if (mode && !listening) {
+        if (mode)
+            listen();
+    }
+
+    void listen() {
+        if (!listening)
             part.gpio->listen(*this);
-            listening = true;
-        }
+        listening = true;
     }
 
     int pin(int signal) const {
@@ -62,10 +74,23 @@ private:
     }
 
     void edge(bool rising) {
-        const uint32_t control = reg(CTRL), mode = field(control, CTRL_MODE);
-        if ((mode != 1 && mode != 2) || control & CTRL_RSTEN || rising == !!(control & CTRL_EDGE) ||
-            part.mode > 3)
-            return;
+        if (rising == !!(reg(CTRL) & CTRL_EDGE) || part.mode > 3) return;
+        const bool clock = part.cmu->clocked_by_pin(instance);
+        const uint32_t mode = field(reg(CTRL), CTRL_MODE);
+        if (mode == 1 || mode == 2) {
+            if (clock != (mode == 2))
+                part.log_once("%s: CTRL.MODE %u needs the other clock of CMU.PCNTCTRL",
+                              instance.name, (unsigned)mode);
+            else if (clock || clock_now().runs())
+                count_pulse();
+        }
+        if (clock)
+            clock_edge();
+    }
+
+    void count_pulse() {
+        const uint32_t control = reg(CTRL);
+        if (control & CTRL_RSTEN) return;
         bool down = control & CTRL_CNTDIR;
         if (control & CTRL_S1CDIR)
             down = !second_input();
