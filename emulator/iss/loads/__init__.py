@@ -17,6 +17,9 @@ ROUNDS = {
     "bodies": 1000,
     "searches": 500,
     "packing": 80,
+    "long_numbers": 2500,
+    "substitutions": 1300,
+    "trees": 1500,
 }
 """The loads, and how many rounds take a tenth of a second."""
 

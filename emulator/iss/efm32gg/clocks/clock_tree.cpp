@@ -101,25 +101,11 @@ void Cmu::rates(Rates &rates, int64_t now) const {
     rates[(int)Clock::ULFRCO] = Rate(ULFRCO_HERTZ, 1, now);
 }
 
-const Cmu::Enable &Cmu::enable_of(const Instance &instance) const {
+const Cmu::Enable &Cmu::enable_of(const Instance &instance) {
     static const Enable always = {nullptr, 0, 0, false, -1, 0, 0};
     for (const Enable &unit : UNITS)
         if (unit.instance->base == instance.base) return unit;
     return always;
-}
-
-bool Cmu::enabled(const Instance &instance) const {
-    // A cache for loops that poll one unit.
-    if (!last || last->base != instance.base) {
-        last = &instance;
-        last_enable = enable_of(instance);
-    }
-    return !last_enable.mask || reg(last_enable.offset) & last_enable.mask;
-}
-
-bool Cmu::on_slow_bus(const Instance &instance) const {
-    enabled(instance);
-    return last_enable.offset == HFPERCLKEN0;
 }
 
 Rate Cmu::unit_rate(const Instance &instance) const {

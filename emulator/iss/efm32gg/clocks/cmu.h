@@ -22,9 +22,14 @@ public:
     Rate unit_rate(const Instance &instance) const;
     // Whether each rising edge at the first input of this pulse counter is its clock.
     bool clocked_by_pin(const Instance &instance) const;
-    bool enabled(const Instance &instance) const;
+    bool enabled(const Instance &instance) const {
+        const Enable &enable = latest(instance);
+        return !enable.mask || reg(enable.offset) & enable.mask;
+    }
     // Whether a unit's registers are behind HFPERCLK.
-    bool on_slow_bus(const Instance &instance) const;
+    bool on_slow_bus(const Instance &instance) const {
+        return latest(instance).offset == cmu::HFPERCLKEN0;
+    }
 
     // Oscillators stop and start with the energy mode; after wake-up the core runs from HFRCO.
     void sleep(int mode) { sleeping = mode; }
@@ -64,14 +69,22 @@ private:
                                        // select bits in PCNTCTRL
     };
     static const Enable UNITS[];
+    // That of the unit accessed last, for loops that poll one unit.
     mutable const Instance *last = nullptr;
-    mutable Enable last_enable = {};
+    mutable const Enable *last_enable = nullptr;
 
     static uint32_t hertz(const Cmu &cmu, int oscillator);
     Rate clock_of(int oscillator, int64_t now) const;
     Rate low_frequency(uint32_t select, bool ultra_low, int64_t now) const;
     bool running(int oscillator) const;
-    const Enable &enable_of(const Instance &instance) const;
+    static const Enable &enable_of(const Instance &instance);
+    const Enable &latest(const Instance &instance) const {
+        if (last != &instance) {
+            last = &instance;
+            last_enable = &enable_of(instance);
+        }
+        return *last_enable;
+    }
     bool locked_register(uint32_t offset) const;
     uint32_t status() const;
     void command_oscillators(uint32_t value);

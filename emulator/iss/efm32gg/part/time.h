@@ -31,6 +31,7 @@ public:
         numerator /= common;
         denominator = hertz / common;
         short_reach = (int64_t)(INT64_MAX / numerator) - 1;
+        short_span = numerator > INT64_MAX ? 0 : INT64_MAX / denominator - 1;
     }
 
     bool runs() const { return hertz != 0; }
@@ -48,6 +49,8 @@ public:
     // Number of edges after the origin, up to and including `time`.
     int64_t edges(int64_t time) const {
         if (!hertz || time < origin) return 0;
+        if (time - origin < short_span)
+            return ((time - origin + 1) * denominator - 1) / (int64_t)numerator;
         return (int64_t)((((__int128)(time - origin) + 1) * denominator - 1) / numerator);
     }
 
@@ -74,7 +77,8 @@ public:
 private:
     int64_t hertz = 0, divider = 1;
     __int128 numerator = 1;
-    int64_t denominator = 1, short_reach = 0;
+    int64_t denominator = 1;
+    int64_t short_reach = 0, short_span = 0;  // edges and times whose products fit into 64 bits
 
     static __int128 gcd(__int128 a, __int128 b) {
         while (b) {

@@ -18,6 +18,7 @@ public:
         Peripheral::reset();
         std::memset(signals, 0, sizeof signals);
         levels = 0;
+        find_selected();
     }
 
     void write(uint32_t offset, uint32_t value) override {
@@ -31,6 +32,7 @@ public:
         for (int channel = 0; channel < CHANNELS; channel++)
             before |= (uint32_t)input(channel) << channel;
         Peripheral::write(offset, value);
+        find_selected();
         for (int channel = 0; channel < CHANNELS; channel++)
             update(channel, before >> channel & 1);
     }
@@ -40,7 +42,7 @@ public:
     void set(int source, int signal, bool level) {
         const bool was = signals[source] >> signal & 1;
         if (was == level) return;
-        for (int channel = 0; channel < CHANNELS; channel++) {
+        for (int channel = 0; channel < CHANNELS && selected >> source & 1; channel++) {
             if (!selects(channel, source, signal)) continue;
             const bool before = input(channel);
             signals[source] = (uint8_t)(signals[source] ^ 1 << signal);
@@ -68,6 +70,13 @@ public:
 private:
     uint8_t signals[64] = {};    // levels by source, one bit per signal
     uint32_t levels = 0;
+    uint64_t selected = 0;       // sources that a channel selects, one bit each
+
+    void find_selected() {
+        selected = 0;
+        for (int channel = 0; channel < CHANNELS; channel++)
+            selected |= (uint64_t)1 << field(control(channel), prs::CH0_CTRL_SOURCESEL);
+    }
 
     uint32_t control(int channel) const { return reg(prs::CH0_CTRL + 4 * (uint32_t)channel); }
 
