@@ -18,7 +18,7 @@ ROUNDS = {
     "searches": 500,
     "packing": 80,
     "long_numbers": 2500,
-    "substitutions": 1300,
+    "substitutions": 700,
     "trees": 1500,
 }
 """The loads, and how many rounds take a tenth of a second."""

@@ -22,7 +22,9 @@ static void make_boxes(void) {    /* powers of 3 reach all elements but 0 */
     powers[255] = 1;
     for (int i = 0; i < 255; i++) {
         const uint8_t inverse = powers[255 - i];
-        box[powers[i]] = (uint8_t)(inverse ^ (inverse << 1 | inverse >> 7) ^ (inverse << 2 | inverse >> 6) ^ 0x35);
+        const uint8_t turned = (uint8_t)(inverse << 1 | inverse >> 7);
+        const uint8_t twice = (uint8_t)(inverse << 2 | inverse >> 6);
+        box[powers[i]] = inverse ^ turned ^ twice ^ 0x35;
     }
     box[0] = 0x35;
     for (int i = 0; i < 256; i++) unbox[box[i]] = (uint8_t)i;

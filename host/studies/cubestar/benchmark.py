@@ -120,7 +120,7 @@ BENCHMARK = Benchmark(
         "readout_wall_ms": "wall time of one transfer, FPGA's SRAM to processor",
         "realtime_ratio": "simulated seconds per wall second of the full 1 Hz loop",
         "instructions_per_s": "of the instruction-set simulator, in an arithmetic loop",
-        "unicorn_ratio": "its speed by unicorn's, over six programs, where unicorn is installed",
+        "unicorn_ratio": "its speed by unicorn's, over nine programs, where unicorn is installed",
         "unicorn_ratio_waits": "the same with the cost of flash wait states, which unicorn lacks",
         "identify_N_ms": "processor time of an identification alone, profile `extended`, with N "
         "false stars",
