@@ -199,7 +199,8 @@ def detect_locally(
     with meter.phase("threshold"):
         rows, columns = picture.shape
         down, across = sample_offsets(rows, columns, STEP)
-        sky = estimate(picture[np.ix_(down, across)], STEP, LEAST_NOISE).smoothed()
+        samples = picture.take(down, axis=0).take(across, axis=1)
+        sky = estimate(samples, STEP, LEAST_NOISE).smoothed()
         charges.charge_background(sky, meter)
         mask = sky.brighter(picture, settings.sigmas) & field.mask
         far = sky.brighter(picture, SPIKE_SIGMAS) & field.mask

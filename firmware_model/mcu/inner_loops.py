@@ -35,6 +35,7 @@ def _array(kind: Any) -> Any:
 
 BYTES, INTS, REALS = _array(np.uint8), _array(np.int64), _array(np.float64)
 INT32S, FLOATS, MARKS = _array(np.int32), _array(np.float32), _array(np.bool_)
+NAMES = _array(np.uint16)
 """Arguments that are arrays in C order, of any shape."""
 
 _library: ctypes.CDLL | None = None

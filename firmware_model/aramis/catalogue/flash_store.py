@@ -60,6 +60,7 @@ class CatalogueStore:
         self.loaded_us: int | None = None  #: end of the latest pass; None before
         self._length = 0
         self._checksum = 0
+        self._copy = np.zeros(0, np.uint8)  # of the model: bytes whose checksum this is
         self._at = 0  # next word of the image in the pass
         self._pass_length: int | None = None
         self._pass_corrected = self._pass_lost = self._pass_us = 0
@@ -138,7 +139,10 @@ class CatalogueStore:
     def _ram_checksum(self) -> int:
         size = self._length
         self._meter.charge(ram_read=-(-size // 4), table_byte=size, loop=size)
-        return crc32(self._ram(size).data)
+        found = self._ram(size)
+        if np.array_equal(found, self._copy):  # a tenth of the model's time
+            return self._checksum
+        return crc32(found.data)
 
     def _begin(self) -> None:
         """Read the header and start a pass; one without a header ends at once."""
@@ -190,3 +194,4 @@ class CatalogueStore:
         self.state = CatalogueState.GOOD
         self._length = length
         self._checksum = crc32(image)
+        self._copy = self._ram(length).copy()

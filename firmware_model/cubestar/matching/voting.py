@@ -25,7 +25,15 @@ from cubestack.firmware_model.cubestar.matching.identification import (
     verify,
 )
 from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.mcu.inner_loops import FLOAT, FLOATS, INT, INTS, NAMES, Loop
 from cubestack.firmware_model.star_tracker.search import MatchOutcome
+
+_VOTE = Loop(
+    "voting_vote",
+    *(FLOATS, NAMES, NAMES, INT),
+    *(FLOATS, INTS, INTS, INT),
+    *(FLOAT, INT, INTS, INTS),
+)
 
 #: Search tolerance of section 4.3.5, about one pixel.
 DEFAULT_MARGIN_RAD = 0.001
@@ -78,14 +86,34 @@ def _vote(
 ) -> NDArray[np.intp]:
     """Votes (centroids, stars) of the entries of the pair list within the margin of each pair;
     either centroid may be either star."""
+    votes, looked_up, steps = (_counted_compiled if _VOTE else _counted)(
+        pairs, listed, stars, margin_rad
+    )
+    meter.charge(flash_read=steps, f32_compare=steps, i32_add=3 * steps, loop=steps)
+    walked = looked_up + len(pairs.angle)
+    meter.charge(flash_read=walked, f32_compare=walked, loop=walked, f32_add=2 * len(pairs.angle))
+    # Two 16-bit counters a vote; the table is cleared word by word.
+    counted, words = 2 * looked_up, votes.size // 2
+    meter.charge(
+        flash_read=2 * looked_up,
+        table_byte=2 * counted,
+        i32_add=4 * counted,
+        ram_write=2 * counted + words,
+        loop=words,
+    )
+    return votes
+
+
+def _counted(
+    pairs: CentroidPairs, listed: PairList, stars: int, margin_rad: float
+) -> tuple[NDArray[np.intp], int, int]:
+    """Votes, entries looked up, and steps of the binary searches."""
     margin = np.float32(margin_rad)
-    start = _search(listed.angle, pairs.angle - margin, meter)
+    start, steps = _search(listed.angle, pairs.angle - margin)
     # The walk from the start ends at the first entry beyond the margin.
     end = np.searchsorted(listed.angle, pairs.angle + margin, side="right")
     lengths = np.maximum(end - start, 0)
     looked_up = int(lengths.sum())
-    walked = looked_up + len(start)
-    meter.charge(flash_read=walked, f32_compare=walked, loop=walked, f32_add=2 * len(start))
     pair = np.repeat(np.arange(len(start)), lengths)
     skipped = np.cumsum(lengths) - lengths
     entry = np.arange(looked_up) - skipped[pair] + start[pair]
@@ -95,22 +123,23 @@ def _vote(
     right = np.concatenate([other + partner, other + star])
     size = pairs.count * stars
     votes = np.bincount(left, minlength=size) + np.bincount(right, minlength=size)
-    # Two 16-bit counters a vote; the table is cleared word by word.
-    counted = len(left)
-    meter.charge(
-        flash_read=2 * looked_up,
-        table_byte=2 * counted,
-        i32_add=4 * counted,
-        ram_write=2 * counted + size // 2,
-        loop=size // 2,
-    )
-    return votes.reshape(pairs.count, stars)
+    return votes.reshape(pairs.count, stars), looked_up, steps
+
+
+def _counted_compiled(
+    pairs: CentroidPairs, listed: PairList, stars: int, margin_rad: float
+) -> tuple[NDArray[np.intp], int, int]:
+    votes, steps = np.zeros((pairs.count, stars), np.intp), np.zeros(1, np.int64)
+    entries = (*(np.ascontiguousarray(e) for e in (listed.angle, listed.first, listed.second)),)
+    wanted = pairs.angle, pairs.first, pairs.second, len(pairs.angle)
+    looked_up = _VOTE(*entries, len(listed), *wanted, margin_rad, stars, votes, steps)
+    return votes, looked_up, int(steps[0])
 
 
 def _search(
-    rising: NDArray[np.float32], wanted: NDArray[np.float32], meter: Meter
-) -> NDArray[np.intp]:
-    """Binary search: for each wanted value the first index whose value is not below it."""
+    rising: NDArray[np.float32], wanted: NDArray[np.float32]
+) -> tuple[NDArray[np.intp], int]:
+    """Binary search: for each wanted value the first index whose value is not below it; steps."""
     low = np.zeros(len(wanted), dtype=np.intp)
     high = np.full(len(wanted), len(rising), dtype=np.intp)
     steps = 0
@@ -121,8 +150,7 @@ def _search(
         below[open_] = rising[middle[open_]] < wanted[open_]
         low = np.where(open_ & below, middle + 1, low)
         high = np.where(open_ & ~below, middle, high)
-    meter.charge(flash_read=steps, f32_compare=steps, i32_add=3 * steps, loop=steps)
-    return low
+    return low, steps
 
 
 def _best(votes: NDArray[np.intp], meter: Meter) -> NDArray[np.int32]:

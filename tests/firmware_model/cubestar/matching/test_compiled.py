@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from cubestack.emulator.native.compiler import find_compiler
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
-from cubestack.firmware_model.cubestar.matching import pair_triangles
+from cubestack.firmware_model.cubestar.matching import pair_triangles, voting
 from cubestack.firmware_model.cubestar.matching.confirmed import PairPass, identify
 from cubestack.firmware_model.cubestar.matching.pair_triangles import PairTriangles
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
@@ -52,6 +52,21 @@ def test_identification(
             limit_s=limit_s,
             passes=passes,
         )
+
+    assert_equal_forms(compute, CORTEX_M3)
+
+
+@settings(max_examples=40)
+@given(SEEDS, st.integers(0, 12), st.booleans(), st.floats(0, 0.01))
+def test_voting(
+    catalogue: StarCatalogue, shoot: Shoot, seed: int, false: int, near: bool, margin: float
+) -> None:
+    shot = shoot(np.random.default_rng(seed), false_stars=false)
+    boresight = shot.attitude[2].astype(np.float32) if near else None
+
+    def compute(meter: Meter) -> object:
+        given = shot.directions, catalogue, meter
+        return voting.identify(*given, boresight=boresight, margin_rad=margin)
 
     assert_equal_forms(compute, CORTEX_M3)
 
