@@ -227,7 +227,8 @@ class Board(ABC):
 
     def _node_link(self, link: Callable[[], NodeLink], baud: int, i2c_address: int) -> None:
         """Connect the satellite's serial line and I2C bus to the handlers from ``link``."""
-        self._serial_line(baud, link)
+        line = self._serial_line(baud, link)
+        line.frame_end = lambda: getattr(link(), "frame_end", None)
         self.i2c_bus.attach(i2c_address, Forwarder(lambda: [link()]))
 
     def _serial_line(

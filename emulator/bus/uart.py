@@ -57,6 +57,8 @@ class Uart:
         host_taps: called with each byte to the device and its start, when it ends on the line and
             before a fault changes it.
         fault_hook: the current fault on the line.
+        frame_end: returns the byte that ends a frame, where others before it only take the
+            processor's time and wait; None where each byte counts.
         framing_errors: number of characters that the device dropped.
     """
 
@@ -79,6 +81,7 @@ class Uart:
         self.taps: list[UartTap] = []
         self.host_taps: list[Callable[[int, int], None]] = []
         self.fault_hook: FaultHook | None = None
+        self.frame_end: Callable[[], int | None] = lambda: None
         self.framing_errors = 0
         self._silence_ps = silence_bytes * self.byte_ps
         self._incoming: deque[tuple[int, LineFormat]] = deque()
@@ -91,6 +94,7 @@ class Uart:
     def send(self, data: bytes) -> None:
         if not data:
             return
+        self._env.idle_until = 0  # a host that waits for an answer wakes earlier
         start = max(self._env.now, self._sending_until)
         self._sending_until = start + len(data) * self.byte_ps
         if self.fault_hook is None:
@@ -136,9 +140,11 @@ class Uart:
                     self._on_wire = 1
                     byte, form = self._incoming[0]
                     if form == self.form and self._sampler.next_ps() is None:
-                        yield self._env.timeout(self.byte_ps)
-                        self._incoming.popleft()
-                        self._deliver(byte, self._env.now - self.byte_ps)
+                        self._on_wire = count = self._at_once()
+                        yield self._env.timeout(count * self.byte_ps)
+                        for later in range(count, 0, -1):
+                            byte, _ = self._incoming.popleft()
+                            self._deliver(byte, self._env.now - later * self.byte_ps)
                     else:
                         yield from self._sample(byte, form)
                         self._incoming.popleft()
@@ -148,6 +154,24 @@ class Uart:
                 silence = self._env.timeout(self._silence_ps)
                 yield simpy.AnyOf(self._env, [self._arrival, silence])
             self.on_silence()
+
+    def _at_once(self) -> int:
+        """Number of bytes that one event can deliver: the first ones up to the end of a frame, as
+        far as no event comes before, the host does nothing before, and nobody observes the bytes.
+        """
+        env, end = self._env, self.frame_end()
+        if end is None or self.taps or self.host_taps or self.fault_hook or env.watched:
+            return 1
+        horizon = env.horizon()
+        until = env.idle_until if horizon is None else min(env.idle_until, horizon)
+        most, count = (until - 1 - env.now) // self.byte_ps, 0
+        for byte, form in self._incoming:
+            if count >= most or form != self.form:
+                break
+            count += 1
+            if byte == end:
+                break
+        return max(count, 1)
 
     def _sample(self, byte: int, form: LineFormat) -> Generator[simpy.Event, Any, None]:
         """Send one character of another format, and deliver what the device received by its end."""

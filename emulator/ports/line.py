@@ -151,17 +151,22 @@ class DirectSerial:
 
     def read(self, max_bytes: int, timeout_s: float) -> bytes:
         """Wait up to ``timeout_s`` of virtual time for a byte; returns those that have arrived."""
-        deadline = self._env.now + int(timeout_s * PS_PER_S)
-        while (arrival := self._line.arrival_ps()) is None or arrival > self._env.now:
-            target = deadline if arrival is None else min(deadline, arrival)
-            if self._env.now >= target:
-                return b""
-            horizon = self._env.horizon()
-            if horizon is not None and horizon < target:
-                self._env.step()
-            else:
-                self._env.advance_to(target)
-        return self._line.take(self._env.now, max_bytes)
+        env = self._env
+        deadline = env.now + int(timeout_s * PS_PER_S)
+        try:
+            while (arrival := self._line.arrival_ps()) is None or arrival > env.now:
+                target = deadline if arrival is None else min(deadline, arrival)
+                if env.now >= target:
+                    return b""
+                horizon = env.horizon()
+                if horizon is not None and horizon < target:
+                    env.idle_until = target
+                    env.step()
+                else:
+                    env.advance_to(target)
+        finally:
+            env.idle_until = 0
+        return self._line.take(env.now, max_bytes)
 
     def close(self) -> None:
         """Disconnect; later output of the device is lost."""

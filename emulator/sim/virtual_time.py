@@ -15,6 +15,10 @@ class Kernel(simpy.Environment):
 
     held_ns: int = 0  # wall time of all finished pauses
 
+    #: Before this time in ps the host that drives the kernel does nothing, whatever is in the
+    #: queue now; 0 where that is unknown.
+    idle_until: int = 0
+
     def __init__(self, initial_time: int = 0) -> None:
         super().__init__(initial_time)
         self._holders = set[str]()

@@ -12,9 +12,14 @@ fills the buffer.
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
-from cubestack.firmware_model.interface.codec.frames import FrameDecoder, FrameEvent, encode_frame
+from cubestack.firmware_model.interface.codec.frames import (
+    END,
+    FrameDecoder,
+    FrameEvent,
+    encode_frame,
+)
 from cubestack.firmware_model.interface.codec.message import (
     TELEMETRY_BIT,
     Interface,
@@ -72,6 +77,9 @@ class SatelliteLink(ABC):
     interface: Interface
     flags: LinkFlags
     send_buffer_bytes: int  #: capacity of the UART's send buffer
+
+    #: Byte on the UART before which no message is complete: others are only decoded and charged.
+    frame_end: ClassVar[int] = END
 
     def __post_init__(self) -> None:
         self._longest = longest_command(self.interface)

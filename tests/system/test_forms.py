@@ -1,10 +1,11 @@
-"""Loops in C++ and reads of whole frames change no byte, time or charge."""
+"""Loops in C++ and frames that are one event change no byte, time or charge."""
 
 from typing import Any
 
 import numpy as np
 import pytest
 
+from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.ports.line import DirectSerial
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.firmware_model.interface.codec.switches import PROFILES
@@ -19,27 +20,37 @@ def scene(name: str, seed: int) -> Any:
     return None if name == "cubesense" else SkyScene.pointing(*where)
 
 
-def observed(name: str, profile: str, seed: int) -> tuple[Any, ...]:
-    """Traffic and charges of an image and of all telemetry behind it, and the time at the end."""
+Seen = dict[str, Any]
+
+
+def observed(name: str, profile: str, seed: int, *, tapped: bool = False) -> tuple[Seen, Seen]:
+    """Answers with their times and charges of an image and of all telemetry behind it; with an
+    observer of bytes also the traffic at the device."""
     with open_device(name, scene(name, seed), seed=seed, profile=profile) as opened:
-        ear, client = Ear(opened.board.uart), opened.client.client
+        ear = vars(Ear(opened.board.uart)) if tapped else {}
+        client, kernel = opened.client.client, opened.board.kernel
         opened.client.observe()
-        for message in client.interface.telemetries:
-            for _ in range(1 + 12 * message.steps):
-                client.request(bytes([message.id]))
+        answers = [
+            (client.request(bytes([message.id])), kernel.now)
+            for message in client.interface.telemetries
+            for _ in range(1 + 12 * message.steps)
+        ]
         meter = opened.board.processor.meter
-        charges = meter.total, dict(meter.counts), list(meter.phases.items())
-        return vars(ear), charges, opened.board.kernel.now
+        charges = {"total": meter.total, "counts": dict(meter.counts), "phases": meter.phases}
+        return {"answers": answers, **charges}, ear
 
 
 @pytest.mark.parametrize("profile", PROFILES)
 @pytest.mark.parametrize("name", ["cubestar", "aramis", "cubesense"])
 def test_forms_are_equal(name: str, profile: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    fast = observed(name, profile, 1)
+    fast, _ = observed(name, profile, 1)
     assert loops_in_use() is not None
-    assert len(fast[0]["sent"]) > 20
+    assert len(fast["answers"]) > 20
+    heard, traffic = observed(name, profile, 1, tapped=True)
+    assert heard == fast
     monkeypatch.delattr(DirectSerial, "read_on")
+    monkeypatch.setattr(Uart, "_at_once", lambda _uart: 1)
     monkeypatch.setattr("cubestack.emulator.sim.firmware_loops.inner_loops", lambda *_: None)
     with python_form():
-        assert observed(name, profile, 1) == fast
+        assert observed(name, profile, 1, tapped=True) == (fast, traffic)
         assert loops_in_use() is None

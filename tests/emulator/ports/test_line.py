@@ -2,6 +2,7 @@
 
 import errno
 from functools import partial
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -167,6 +168,60 @@ def frames_in(
 def test_whole_frames_are_read_when_a_host_by_byte_has_them(sent, others, timeout_s):
     whole = frames_in(True, sent, others, timeout_s)
     assert whole == frames_in(False, sent, others, timeout_s)
+
+
+def conversation(
+    at_once: bool, turns: list[tuple[bytes, int]], others: list[int], answers: int
+) -> list[tuple[Any, ...]]:
+    """What events and a host see while it writes and reads in turn: received bytes, times, data."""
+    kernel, seen, received = Kernel(), [], bytearray()
+
+    def on_byte(byte: int) -> None:
+        received.append(byte)
+        if byte == END:
+            seen.append((len(received), kernel.now))
+            uart.send(bytes(answers))
+
+    def on_silence() -> None:
+        seen.append((len(received), kernel.now, "silence"))
+
+    uart = Uart(kernel, 1_000_000, on_byte, on_silence, silence_bytes=3)
+    serial = DirectSerial(kernel, uart)
+    if at_once:
+        uart.frame_end = lambda: END
+    for after in others:
+        event = kernel.timeout(after)
+        event.callbacks.append(lambda _event: seen.append((len(received), kernel.now)))
+    for data, wait_ps in turns:
+        serial.write(data)
+        answer = serial.read(64, wait_ps / PS_PER_S)
+        seen.append((answer, len(received), kernel.now, uart.host_backlog))
+    return seen
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.lists(st.sampled_from([0, 1, END]), max_size=7).map(bytes),
+            st.integers(0, 12).map(lambda count: count * BYTE // 2),
+        ),
+        max_size=8,
+    ),
+    st.lists(st.integers(0, 100).map(lambda count: count * BYTE // 4), max_size=12),
+    st.integers(0, 4),
+)
+def test_bytes_that_one_event_delivers_are_seen_as_if_they_came_alone(turns, others, answers):
+    one_by_one = conversation(False, turns, others, answers)
+    assert conversation(True, turns, others, answers) == one_by_one
+
+
+def test_frame_of_a_host_that_waits_is_one_event(device, serial):
+    device.uart.frame_end = lambda: END
+    serial.write(bytes(20) + bytes([END]))
+    before = next(device.kernel._eid)
+    serial.read(10, 1e-3)
+    assert device.received == bytes(20) + bytes([END])
+    assert next(device.kernel._eid) - before < 10
 
 
 def test_observer_of_steps_sees_every_byte(device, serial):
