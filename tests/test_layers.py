@@ -30,7 +30,7 @@ LAZY = ("api", "devices", "parts", "pytest_plugin", "sensors", "targets")
 ORDER = {
     "emulator": (
         "native",
-        "iss",
+        "iss light",
         "sim",
         "bus rtl scene",
         "camera ports",

@@ -1,8 +1,7 @@
 """Starlight on the sensor: the electrons of each star while the camera turns.
 
 CubeStar thesis, section 4.1.1 (defocused stars as a two-dimensional Gaussian, eq. 4.1.7) and
-appendix C (rolling shutter). The Gaussian is integrated over each pixel's square, as in a detector,
-not sampled at its centre.
+appendix C (rolling shutter).
 
 Motion is a sum over instants of the exposure, closer together than one sigma of the spot. Each star
 is placed at the instants of its own row, so a rolling shutter shifts, bends and stretches its
@@ -19,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from cubestack.emulator.camera.common.glow import glow_electrons
 from cubestack.emulator.camera.common.optics import Optics
 from cubestack.emulator.camera.common.shutter import RollingShutter
+from cubestack.emulator.light.spots import spots
 from cubestack.emulator.scene.attitude import matrix_from_quaternion
 from cubestack.emulator.scene.hazards.contract import CameraState, Vectors
 from cubestack.emulator.scene.hipparcos import load_sky
@@ -28,14 +28,8 @@ from cubestack.emulator.sim.virtual_time import PS_PER_S
 FAINTEST_V = 8.0
 """Magnitude limit: at the longest exposure, fainter stars peak below one count of 8 bits."""
 
-SPOT_SIGMAS = 5.0
-CELLS_AT_ONCE = 3_400_000  # limits the memory for long streaks and wide spots
 VELOCITY_STEP_S = 0.01
 MOST_GLOWS = 8  # limit of the instants of an exposure at which a glow is evaluated
-
-_Z = np.arange(-8.0, 8.0, 1 / 512)
-#: The normal distribution function; linear interpolation in it is accurate to 1e-7.
-_PHI = np.array([0.5 * (1 + math.erf(z / math.sqrt(2))) for z in _Z])
 
 
 def star_light(scene: SkyScene, optics: Optics, shutter: RollingShutter) -> NDArray[np.float32]:
@@ -55,7 +49,8 @@ def star_light(scene: SkyScene, optics: Optics, shutter: RollingShutter) -> NDAr
         pixels.append(places * [optics.columns - 1, optics.rows - 1])
         light.append(optics.electrons_per_second(magnitudes))
     electrons = np.concatenate(light) * shutter.exposure_s
-    image = _spots(np.concatenate(pixels), electrons, optics)
+    shape = optics.rows, optics.columns
+    image = spots(np.concatenate(pixels), electrons, optics.psf_sigma_px, shape)
     if scene.atmosphere is not None and scene.atmosphere.sky_mag is not None:
         glow = optics.electrons_per_second(scene.atmosphere.sky_mag) * optics.pixel_arcsec2
         image += np.float32(glow * shutter.exposure_s) * optics.even_light
@@ -217,39 +212,3 @@ def _instant(
     stretch = 1 / (1 - per_line[:, 1])
     lines = (pixels[:, 1] - (optics.rows - 1) / 2) * stretch
     return pixels + per_line * lines[:, None], weights * stretch
-
-
-def _spots(
-    pixels: NDArray[np.float64], electrons: NDArray[np.float64], optics: Optics
-) -> NDArray[np.float32]:
-    """Sum of Gaussian spots at ``pixels`` (n, 2) on the sensor (rows, columns); skips NaN."""
-    sigma_px = optics.psf_sigma_px
-    half = math.ceil(SPOT_SIGMAS * sigma_px) + 1
-    columns, rows = optics.columns, optics.rows
-    with np.errstate(invalid="ignore"):
-        near = np.all((pixels > -half) & (pixels < (columns - 1 + half, rows - 1 + half)), axis=1)
-    pixels, electrons = pixels[near], electrons[near]
-    # A canvas with a margin, which contains the spots of all these stars.
-    margin = 2 * half + 1
-    height, width = rows + 2 * margin, columns + 2 * margin
-    canvas = np.zeros(height * width)
-    cells = np.arange(-half, half + 1)
-    at_once = CELLS_AT_ONCE // len(cells) ** 2
-    for first in range(0, len(pixels), at_once):
-        some = slice(first, first + at_once)
-        nearest = np.rint(pixels[some]).astype(np.int64)
-        shares = _shares(pixels[some] - nearest, half, sigma_px)
-        shares[:, 1] *= electrons[some, None]
-        spots = shares[:, 1, :, None] * shares[:, 0, None, :]
-        starts = (nearest[:, 1, None] + margin + cells) * width
-        index = starts[:, :, None] + (nearest[:, 0, None] + margin + cells)[:, None, :]
-        canvas += np.bincount(index.ravel(), spots.ravel(), canvas.size)
-    image = canvas.reshape(height, width)[margin:-margin, margin:-margin]
-    return image.astype(np.float32)
-
-
-def _shares(offsets: NDArray[np.float64], half: int, sigma_px: float) -> NDArray[np.float64]:
-    """Share of each spot in the columns and rows around it: (n, 2) to (n, 2, 2 * half + 1)."""
-    edges = np.arange(-half, half + 2) - 0.5
-    z = (edges - offsets[:, :, None]) / sigma_px
-    return np.diff(np.interp(z, _Z, _PHI), axis=-1)

@@ -14,9 +14,10 @@ from typing import Any, ClassVar, Generic
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.emulator.camera.common.imager import Grey
 from cubestack.emulator.camera.common.register_file import RegisterFile
 from cubestack.emulator.camera.common.view import C, S, SkyCondition, View
+from cubestack.emulator.light.library import light_library
+from cubestack.emulator.light.pixels import Grey
 from cubestack.emulator.scene.sky import PictureScene, Scene, SkyScene
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.interface.cameras.registers import CameraRegisterMap
@@ -101,6 +102,7 @@ class ImageSensor(ABC, Generic[S, C]):
         self._powered = True
         self._in_reset = False
         self._images: deque[tuple[Any, Grey]] = deque(maxlen=KEPT)
+        light_library()  # compiled now, not within the first frame
 
     @property
     def scene(self) -> S:

@@ -4,17 +4,16 @@ from abc import ABC, abstractmethod
 from typing import Generic, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cubestack.emulator.camera.common.exposure import star_light
 from cubestack.emulator.camera.common.hazards import effects
 from cubestack.emulator.camera.common.hazards.contract import Exposure
 from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.common.view import SkyCondition
+from cubestack.emulator.light.noise import FrameNoise
+from cubestack.emulator.light.pixels import Grey, Light, PixelModel, grey_values
 from cubestack.emulator.scene.sky import PictureScene, Scene
 
-Light = NDArray[np.float32]
-Grey = NDArray[np.uint8]
 Settings = TypeVar("Settings", contravariant=True)
 
 
@@ -43,10 +42,8 @@ class Imager(ABC, Generic[Settings]):
         light = effects.disturb_light(
             star_light(scene, optics, shutter), condition.hazards, exposure, seed
         )
-        generator = None
-        if condition.noise:
-            generator = np.random.Generator(np.random.SFC64(seed))
-        return self.counts(light, shutter.exposure_s, condition, settings, generator)
+        noise = FrameNoise(seed) if condition.noise else None
+        return self.counts(light, shutter.exposure_s, condition, settings, noise)
 
     def exposure(
         self, shape: tuple[int, int], seconds: float, condition: SkyCondition, settings: Settings
@@ -64,23 +61,36 @@ class Imager(ABC, Generic[Settings]):
     def electrons_per_count(self, settings: Settings) -> float:
         """Charge of one grey value of 8 bits at the gain in ``settings``."""
 
-    @abstractmethod
     def counts(
         self,
         light: Light,
         exposure_s: float,
         condition: SkyCondition,
         settings: Settings,
-        generator: np.random.Generator | None,
+        noise: FrameNoise | None,
     ) -> Grey:
-        """Grey values (rows, columns).
+        """Grey values (rows, columns) of ``light``, mean numbers of electrons; see `pixels`."""
+        rows, columns = light.shape
+        model = self.pixels((rows, columns), exposure_s, condition, settings, noise)
+        return grey_values(light, model)
+
+    @abstractmethod
+    def pixels(
+        self,
+        shape: tuple[int, int],
+        exposure_s: float,
+        condition: SkyCondition,
+        settings: Settings,
+        noise: FrameNoise | None,
+    ) -> PixelModel:
+        """The sensor's pixels in one frame, for light in electrons.
 
         Args:
-            light: mean number of electrons in each pixel, shape (rows, columns).
+            shape: rows and columns.
             exposure_s: exposure of each pixel.
             condition: temperature, hot pixels and their seed, hazards.
             settings: as for ``render``.
-            generator: source of this frame's noise; None for a sensor without noise and defects.
+            noise: of this frame; None for a sensor without noise and defects.
         """
 
 

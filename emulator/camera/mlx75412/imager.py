@@ -5,19 +5,20 @@ and appendix E: 2.28 electrons per count of 12 bits, dark signal of 1008 counts 
 Read noise, fixed pattern, defects and the dark signal's dependence on temperature are not
 published; these constants are assumed, typical of automotive sensors of that time.
 
-Shot, dark and read noise are drawn at once, as one normal distribution with the mean and the
-variance of the sum, so that a frame needs one normal field. This neglects the skewness of the
-Poisson part, which is at most 0.034 with this read noise.
+Shot, dark and read noise are drawn as one normal number (`emulator.light.pixels`), which neglects
+the skewness of the Poisson part. With this read noise it is at most 0.034.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from cubestack.emulator.camera.common.dark import dark_at, hot_pixels
 from cubestack.emulator.camera.common.hazards import effects
-from cubestack.emulator.camera.common.imager import Grey, Imager, Light
+from cubestack.emulator.camera.common.imager import Imager
 from cubestack.emulator.camera.common.view import SkyCondition
+from cubestack.emulator.light.noise import FrameNoise
+from cubestack.emulator.light.pixels import NOWHERE, Light, PixelModel
 from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
 
 ELECTRONS_PER_DN12 = 2.28  # per count of 12 bits (published)
@@ -49,9 +50,8 @@ def dark_dn12_per_second(temperature_c: float) -> float:
     return dark_at(DARK_DN12_PER_S_AT_65_C, temperature_c, 65.0)
 
 
-def ideal_counts(electrons: Light) -> Grey:
-    """Upper 8 of 12 bits for ``electrons`` without noise and defects."""
-    return _upper_bits(electrons * np.float32(1 / ELECTRONS_PER_DN12))
+IDEAL = PixelModel(gain=1 / ELECTRONS_PER_DN12, full_scale=FULL_SCALE_DN12, step=1 / DN12_PER_DN8)
+"""Pixels without noise and defects: whole counts of 12 bits, saturated, of which the upper 8."""
 
 
 class Mlx75412Imager(Imager[Corrections]):
@@ -67,57 +67,50 @@ class Mlx75412Imager(Imager[Corrections]):
         self._gain = 1 + field(GAIN_NON_UNIFORMITY)
         self._dark_share = np.maximum(1 + field(DARK_NON_UNIFORMITY), 0)
         self._pattern = field(COLUMN_PATTERN_DN12, (1, COLUMNS)) + field(PIXEL_PATTERN_DN12)
+        self._pattern_left = self._pattern * np.float32(PATTERN_LEFT)
         # Not in the outer columns, whose pixels have only one neighbour for the correction.
         places = generator.choice(ROWS * (COLUMNS - 2), FACTORY_DEAD + FACTORY_HOT, replace=False)
         rows, columns = np.divmod(places, COLUMNS - 2)
-        self._defects = rows, columns + 1
-        self._gain[rows[:FACTORY_DEAD], columns[:FACTORY_DEAD] + 1] = 0
-        self._hot = rows[FACTORY_DEAD:], columns[FACTORY_DEAD:] + 1
+        places = rows * COLUMNS + columns + 1
+        self._defects = np.sort(places)
+        self._gain.ravel()[places[:FACTORY_DEAD]] = 0
+        self._hot = places[FACTORY_DEAD:]
         self._hot_share = generator.exponential(size=FACTORY_HOT).astype(np.float32)
 
     def electrons_per_count(self, settings: Corrections) -> float:
         del settings
         return ELECTRONS_PER_DN12 * DN12_PER_DN8
 
-    def counts(
+    def pixels(
         self,
-        light: Light,
+        shape: tuple[int, int],
         exposure_s: float,
         condition: SkyCondition,
         settings: Corrections,
-        generator: np.random.Generator | None,
-    ) -> Grey:
-        if generator is None:
-            return ideal_counts(light)
+        noise: FrameNoise | None,
+    ) -> PixelModel:
+        if noise is None:
+            return IDEAL
         per_second = dark_dn12_per_second(condition.temperature_c)
         hot_per_second = HOT_DN12_PER_S_AT_20_C * (per_second / dark_dn12_per_second(20.0))
-        per_second *= effects.dark_rise(condition.hazards)
-        dark_electrons = np.float32(per_second * exposure_s * ELECTRONS_PER_DN12)
-        hot_electrons = np.float32(hot_per_second * (exposure_s * ELECTRONS_PER_DN12))
-        mean = self._dark_share * dark_electrons
-        mean += light * self._gain
-        mean[self._hot] += self._hot_share * hot_electrons
-        if condition.hot_count:
-            # The sensor does not correct these.
-            places, share = hot_pixels(condition.seed, condition.hot_count, light.size)
-            mean.ravel()[places] += share * hot_electrons
-        exposure = self.exposure((ROWS, COLUMNS), exposure_s, condition, settings)
-        steady = READ_NOISE_ELECTRONS**2 + effects.variance(condition.hazards, exposure)
-        signal = generator.standard_normal(mean.shape, np.float32)
-        signal *= np.sqrt(mean + np.float32(steady))
-        signal += mean
-        signal *= np.float32(1 / ELECTRONS_PER_DN12)
-        signal += self._pattern * np.float32(PATTERN_LEFT if settings.fixed_pattern else 1)
-        if settings.dark:
-            signal -= np.float32(per_second * exposure_s)
-        if settings.defects:
-            rows, columns = self._defects
-            signal[rows, columns] = (signal[rows, columns - 1] + signal[rows, columns + 1]) / 2
-        return _upper_bits(signal)
-
-
-def _upper_bits(dn12: Light) -> Grey:
-    """Round to whole counts of 12 bits, saturate, and take the upper 8 bits."""
-    counts: Light = np.clip(dn12 + np.float32(0.5), 0, FULL_SCALE_DN12)
-    counts *= np.float32(1 / DN12_PER_DN8)  # a power of two: exact, so truncation drops 4 bits
-    return counts.astype(np.uint8, order="C")
+        dark = per_second * effects.dark_rise(condition.hazards) * exposure_s * ELECTRONS_PER_DN12
+        # The sensor does not correct those of the condition.
+        grown, share = hot_pixels(condition.seed, condition.hot_count, shape[0] * shape[1])
+        hot = np.concatenate([self._hot, grown])
+        order = np.argsort(hot, kind="stable")
+        hot_charge = np.concatenate([self._hot_share, share])[order]
+        hot_charge *= np.float32(hot_per_second * (exposure_s * ELECTRONS_PER_DN12))
+        exposure = self.exposure(shape, exposure_s, condition, settings)
+        return replace(
+            IDEAL,
+            response=self._gain,
+            dark=dark,
+            dark_share=self._dark_share,
+            hot=hot[order],
+            hot_charge=hot_charge,
+            noise=noise,
+            steady=READ_NOISE_ELECTRONS**2 + effects.variance(condition.hazards, exposure),
+            pattern=self._pattern_left if settings.fixed_pattern else self._pattern,
+            black=dark if settings.dark else 0.0,
+            repaired=self._defects if settings.defects else NOWHERE,
+        )

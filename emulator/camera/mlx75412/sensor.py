@@ -19,11 +19,11 @@ from functools import partial
 import numpy as np
 
 from cubestack.emulator.camera.common.image_sensor import PixelClock, StarSensor, StreamSegment
-from cubestack.emulator.camera.common.imager import Grey
 from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.common.view import SkyCondition, SkyView
 from cubestack.emulator.camera.mlx75412.imager import Corrections, Mlx75412Imager
 from cubestack.emulator.camera.mlx75412.lens import CONDITION
+from cubestack.emulator.light.pixels import Grey
 from cubestack.emulator.scene.sky import Scene
 from cubestack.firmware_model.interface.cameras import mlx75412 as chip
 

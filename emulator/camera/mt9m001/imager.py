@@ -6,8 +6,7 @@ can be switched off. MT9M001 data sheet, key performance: a signal to noise rati
 and a dynamic range of 68.2 dB, from which the full well (its square root is that ratio) and the
 read-out noise follow. Values that neither publishes are marked as assumed.
 
-Shot, dark, background and read-out noise are drawn at once, as one normal distribution with the
-mean and the variance of their sum.
+Shot, dark, background and read-out noise are drawn as one normal number (`emulator.light.pixels`).
 """
 
 from dataclasses import dataclass, replace
@@ -16,10 +15,12 @@ import numpy as np
 
 from cubestack.emulator.camera.common.dark import dark_at, hot_pixels
 from cubestack.emulator.camera.common.hazards import effects
-from cubestack.emulator.camera.common.imager import Grey, Imager, Light
+from cubestack.emulator.camera.common.imager import Imager
 from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.common.view import SkyCondition
 from cubestack.emulator.camera.mt9m001.registers import SensorSettings
+from cubestack.emulator.light.noise import FrameNoise
+from cubestack.emulator.light.pixels import NO_CHARGE, NOWHERE, Grey, Light, PixelModel
 from cubestack.emulator.scene.sky import Scene
 from cubestack.firmware_model.interface.cameras.mt9m001 import COLUMNS, ROWS
 
@@ -98,55 +99,53 @@ class Mt9m001Imager(Imager[SensorSettings]):
         """For the mean of the four gains; see ``Imager``."""
         return FULL_WELL_ELECTRONS / (COUNTS * float(np.mean(settings.gains)))
 
-    def counts(
+    def pixels(
         self,
-        light: Light,
+        shape: tuple[int, int],
         exposure_s: float,
         condition: SkyCondition,
         settings: SensorSettings,
-        generator: np.random.Generator | None,
-    ) -> Grey:
-        terms = NoiseTerms.none() if generator is None else self._noise
+        noise: FrameNoise | None,
+    ) -> PixelModel:
+        terms = NoiseTerms.none() if noise is None else self._noise
         surplus = self._background * exposure_s if terms.background else 0.0
         own_dark = dark_electrons_per_s(condition.temperature_c) * exposure_s
-        dark = own_dark * effects.dark_rise(condition.hazards)
+        dark = own_dark * effects.dark_rise(condition.hazards) if terms.dark else 0.0
+        hot, hot_charge = NOWHERE, NO_CHARGE
         if terms.dark:
-            surplus += dark
-        mean = light + np.float32(surplus)
-        if terms.dark and condition.hot_count:
             seed = condition.seed + self._seed
-            places, share = hot_pixels(seed, condition.hot_count, light.size, HOT_SHARE)
-            mean.ravel()[places] += share * np.float32(own_dark)
+            hot, share = hot_pixels(seed, condition.hot_count, shape[0] * shape[1], HOT_SHARE)
+            order = np.argsort(hot)
+            hot, hot_charge = hot[order], share[order] * np.float32(own_dark)
         steady = READ_NOISE_ELECTRONS**2 if terms.readout else 0.0
         exposure = self.exposure((ROWS, COLUMNS), exposure_s, condition, settings)
         steady += effects.variance(condition.hazards, exposure)
-        variance = (mean if terms.shot else mean - light) + np.float32(steady)
-        signal = mean
-        if generator is not None and (terms.shot or surplus or steady):
-            noise = generator.standard_normal(light.shape, np.float32)
-            noise *= np.sqrt(variance)
-            signal += noise
-        # The chip subtracts the mean of the dark rows, which contains the mean dark current.
-        if terms.dark:
-            signal -= np.float32(dark)
-        scale = (FULL_SCALE + 1) / FULL_WELL_ELECTRONS
-        signal *= _gain(settings) * np.float32(scale)
-        signal += np.float32(BLACK_LEVEL)
-        if not terms.quantisation:
-            signal /= np.float32(4)
-            nearest: Light = np.clip(signal + np.float32(0.5), 0, FULL_SCALE // 4)
-            return nearest.astype(np.uint8)
-        whole: Light = np.clip(signal + np.float32(0.5), 0, FULL_SCALE)
-        return (whole.astype(np.uint16) >> 2).astype(np.uint8)
+        # Eight of ten bits are wired; without quantisation, they are the nearest.
+        full_scale, step = (FULL_SCALE, 0.25) if terms.quantisation else (FULL_SCALE // 4, 1.0)
+        per_count = 0.25 / step
+        scale = (FULL_SCALE + 1) / FULL_WELL_ELECTRONS * per_count
+        return PixelModel(
+            dark=surplus + dark,
+            hot=hot,
+            hot_charge=hot_charge,
+            noise=noise if terms.shot or surplus + dark or steady else None,
+            shot_of_light=terms.shot,
+            steady=steady,
+            # The chip subtracts the mean of the dark rows, which contains the mean dark current.
+            black=dark,
+            gain=_gains(settings, shape[1]) * np.float32(scale),
+            offset=BLACK_LEVEL * per_count,
+            full_scale=full_scale,
+            step=step,
+        )
 
 
-def _gain(settings: SensorSettings) -> float | Light:
-    even, odd_row, odd_column, odd = settings.gains
-    if even == odd_row == odd_column == odd:
-        return even
+def _gains(settings: SensorSettings, columns: int) -> Light:
+    """Gain (2, columns) of the array's even and odd rows."""
     # Even and odd refer to the window (assumed), whose start is even in the array.
+    even, odd_row, odd_column, odd = settings.gains
     gains = np.array([[even, odd_column], [odd_row, odd]], np.float32)
-    return np.roll(np.tile(gains, (ROWS // 2, COLUMNS // 2)), settings.row, axis=0)
+    return np.tile(np.roll(gains, settings.row, axis=0), (1, columns // 2))
 
 
 def _window(full: Grey, settings: SensorSettings) -> Grey:

@@ -17,12 +17,12 @@ from dataclasses import dataclass
 from functools import partial
 
 from cubestack.emulator.camera.common.image_sensor import PixelClock, StarSensor, StreamSegment
-from cubestack.emulator.camera.common.imager import Grey
 from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.common.view import SkyCondition, SkyView
 from cubestack.emulator.camera.mt9m001.imager import Mt9m001Imager, NoiseTerms
 from cubestack.emulator.camera.mt9m001.lens import CONDITION
 from cubestack.emulator.camera.mt9m001.registers import SensorSettings, read_settings, write_word
+from cubestack.emulator.light.pixels import Grey
 from cubestack.emulator.scene.sky import Scene
 from cubestack.firmware_model.interface.cameras import mt9m001 as chip
 

@@ -10,8 +10,9 @@ are below a tenth of a grey value.
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cubestack.emulator.light.noise import FrameNoise
+from cubestack.emulator.light.pixels import Grey, Light, PixelModel, Places, grey_values
 from cubestack.firmware_model.interface.cameras.ov7620 import COLUMNS, ROWS
 
 BLACK = 34
@@ -32,36 +33,26 @@ ELECTRONS_PER_GREY = 1 / SHOT_NOISE
 
 
 def luminance(
-    light: NDArray[np.float32],
-    gain: float,
-    generator: np.random.Generator | None,
-    stuck: NDArray[np.int64],
-    variance: float = 0.0,
-) -> NDArray[np.uint8]:
+    light: Light, gain: float, noise: FrameNoise | None, stuck: Places, variance: float = 0.0
+) -> Grey:
     """Grey values (480, 640) of ``light``, of the same shape.
 
     Args:
         light: grey values above black at gain 1, unlimited.
         gain: amplification.
-        generator: source of this frame's noise; None for an ideal sensor.
+        noise: of this frame; None for an ideal sensor.
         stuck: flat indices of pixels at full scale.
         variance: variance of additional noise, grey values squared at gain 1.
     """
-    if generator is None:
-        signal = light * np.float32(gain)
-    else:
-        signal = generator.standard_normal(light.shape, np.float32)
-        signal *= np.sqrt(light * np.float32(SHOT_NOISE) + np.float32(READ_NOISE**2 + variance))
-        signal += light
-        signal *= np.float32(gain)
-    signal += np.float32(BLACK + 0.5)
-    grey = np.clip(signal, 0, FULL_SCALE, out=signal).astype(np.uint8)
-    grey.ravel()[stuck] = FULL_SCALE
-    return grey
+    steady = READ_NOISE**2 + variance
+    model = PixelModel(
+        noise=noise, shot=SHOT_NOISE, steady=steady, gain=gain, offset=BLACK, stuck=stuck
+    )
+    return grey_values(light, model)
 
 
 @lru_cache(maxsize=8)
-def stuck_pixels(seed: int, camera: int, singles: int, pairs: int) -> NDArray[np.int64]:
+def stuck_pixels(seed: int, camera: int, singles: int, pairs: int) -> Places:
     """Flat indices of ``singles`` stuck pixels and ``pairs`` of adjacent ones in a row.
 
     They differ per ``camera`` number.
@@ -70,6 +61,6 @@ def stuck_pixels(seed: int, camera: int, singles: int, pairs: int) -> NDArray[np
     # Slots of four columns, so that no two of them form a run of three.
     slots = 4 * generator.choice(ROWS * COLUMNS // 4, singles + pairs, replace=False)
     first = slots + generator.integers(0, 2, len(slots))
-    stuck: NDArray[np.int64] = np.concatenate([first, first[:pairs] + 1])
+    stuck: Places = np.concatenate([first, first[:pairs] + 1])
     stuck.flags.writeable = False
     return stuck

@@ -24,7 +24,6 @@ import numpy as np
 from cubestack.emulator.camera.common.hazards import effects
 from cubestack.emulator.camera.common.hazards.contract import Exposure, Lens
 from cubestack.emulator.camera.common.image_sensor import ImageSensor, PixelClock, StreamSegment
-from cubestack.emulator.camera.common.imager import Grey, Light
 from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.ov7620 import luminance
 from cubestack.emulator.camera.ov7620.fisheye import check_field
@@ -32,6 +31,8 @@ from cubestack.emulator.camera.ov7620.lens_error import NOMINAL, LensError
 from cubestack.emulator.camera.ov7620.light import blur, scene_light
 from cubestack.emulator.camera.ov7620.sccb import SccbSlave
 from cubestack.emulator.camera.ov7620.view import IN_FOCUS, EarthSunView, FisheyeCondition
+from cubestack.emulator.light.noise import FrameNoise
+from cubestack.emulator.light.pixels import Grey, Light
 from cubestack.emulator.scene.earth_sun import CameraTarget, EarthSunScene
 from cubestack.firmware_model.interface.cameras import ov7620 as chip
 
@@ -256,13 +257,11 @@ class Ov7620(ImageSensor[EarthSunScene, FisheyeCondition]):
         )
         light = effects.disturb_light(light, hazards, exposure, seed, luminance.ELECTRONS_PER_GREY)
         variance = effects.variance(hazards, exposure) / luminance.ELECTRONS_PER_GREY**2
-        generator = None
-        if condition.noise:
-            generator = np.random.Generator(np.random.SFC64(seed))
+        noise = FrameNoise(seed) if condition.noise else None
         stuck = luminance.stuck_pixels(
             condition.seed, self.camera, condition.hot_count, condition.hot_pairs
         )
-        grey = luminance.luminance(light, settings.gain, generator, stuck, variance)
+        grey = luminance.luminance(light, settings.gain, noise, stuck, variance)
         rows, columns = settings.rows, settings.columns
         window = grey[rows.start : rows.stop, columns.start : columns.stop]
         return np.ascontiguousarray(window[:, ::-1] if settings.mirror else window)

@@ -16,9 +16,10 @@ from cubestack.emulator.camera.common.exposure import (
 )
 from cubestack.emulator.camera.common.optics import Optics
 from cubestack.emulator.camera.common.shutter import RollingShutter
-from cubestack.emulator.camera.mlx75412.imager import DN12_PER_DN8, ELECTRONS_PER_DN12, ideal_counts
+from cubestack.emulator.camera.mlx75412.imager import DN12_PER_DN8, ELECTRONS_PER_DN12, IDEAL
 from cubestack.emulator.camera.mlx75412.lens import LENS
 from cubestack.emulator.camera.mt9m001.lens import double_gauss
+from cubestack.emulator.light.pixels import grey_values
 from cubestack.emulator.scene.atmosphere import Atmosphere
 from cubestack.emulator.scene.hipparcos import load_sky
 from cubestack.emulator.scene.picture import PictureScene
@@ -189,7 +190,7 @@ def test_stars_at_the_magnitude_limits_have_the_expected_counts() -> None:
     x, y, z = star(hip)
     dec, ra = np.degrees(np.arcsin(z)), np.degrees(np.arctan2(y, x))
     scene = replace(SkyScene.pointing(ra, dec), mag_limit=3.81)
-    total, _ = light_around(ideal_counts(light(scene)), 539, 175, half=5)
+    total, _ = light_around(grey_values(light(scene), IDEAL), 539, 175, half=5)
     assert 275 < total < 301  # truncation to whole counts takes some
     peak = LENS.electrons_per_second(FAINTEST_V) * LONG.exposure_s * 0.39**2 / 0.81
     assert peak / ELECTRONS_PER_DN12 / DN12_PER_DN8 < 1.3
@@ -231,7 +232,7 @@ def test_published_centroiding_error_of_18_noise_free_stars() -> None:
     for seed in range(20):
         lights = replace(scene, seed=seed)
         places = lights.false_lights()[0] * [1023, 511]
-        counts = ideal_counts(light(lights)).astype(float)
+        counts = grey_values(light(lights), IDEAL).astype(float)
         apart = np.linalg.norm(places[:, None] - places, axis=2) + 100 * np.eye(18)
         inside = np.all((places > 8) & (places < (1015, 503)), axis=1) & (apart.min(axis=1) > 16)
         for x, y in places[inside]:

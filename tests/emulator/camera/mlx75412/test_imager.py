@@ -9,6 +9,8 @@ from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.common.view import SkyCondition
 from cubestack.emulator.camera.mlx75412 import imager as chip
 from cubestack.emulator.camera.mlx75412.lens import CONDITION, LENS
+from cubestack.emulator.light.noise import FrameNoise
+from cubestack.emulator.light.pixels import grey_values
 from cubestack.emulator.scene.sky import PictureScene, SkyScene
 from tests.emulator.scene.hazards.around import SHUTTER as LONG
 
@@ -31,15 +33,17 @@ def frame(
     hot: int = 0,
 ) -> np.ndarray:
     condition = replace(CONDITION, temperature_c=temperature_c, hot_pixels=hot, seed=9)
-    imager, generator = chip.Mlx75412Imager(part), np.random.default_rng(seed)
-    return imager.counts(electrons, exposure_s, condition, corrections, generator).astype(float)
+    imager, noise = chip.Mlx75412Imager(part), FrameNoise([seed])
+    return imager.counts(electrons, exposure_s, condition, corrections, noise).astype(float)
 
 
 def test_ideal_counts_are_the_upper_bits_of_12() -> None:
     every = np.arange(4096, dtype=np.float32)
     odd = np.array([7.4, 15.6, 31.4, 9000], np.float32)  # 15.6 rounds to 16; beyond is saturated
     dn12 = np.concatenate([every, odd]) * np.float32(chip.ELECTRONS_PER_DN12)
-    np.testing.assert_array_equal(chip.ideal_counts(dn12), [*(np.arange(4096) >> 4), 0, 1, 1, 255])
+    np.testing.assert_array_equal(
+        grey_values(dn12[None], chip.IDEAL)[0], [*(np.arange(4096) >> 4), 0, 1, 1, 255]
+    )
 
 
 def test_dark_signal_at_65_c_matches_the_published_value() -> None:
@@ -75,7 +79,7 @@ def test_normal_noise_approximates_poisson_plus_read_noise() -> None:
     generator = np.random.default_rng(3)
     exact = generator.poisson(mean, 500_000).astype(float)
     exact += generator.normal(0, chip.READ_NOISE_ELECTRONS, 500_000)
-    reference = chip.ideal_counts(exact.astype(np.float32)).astype(float)
+    reference = grey_values(exact.astype(np.float32)[None], chip.IDEAL).astype(float)
     for level in range(4, 12):
         assert np.mean(counts >= level) == pytest.approx(np.mean(reference >= level), abs=0.01)
 
@@ -153,7 +157,7 @@ def test_noise_repeats_for_the_same_scene_and_frame_only() -> None:
 
 def test_frame_without_noise_equals_the_ideal_counts() -> None:
     quiet = picture(ORION, condition=replace(CONDITION, noise=False, temperature_c=65))
-    np.testing.assert_array_equal(quiet, chip.ideal_counts(star_light(ORION, LENS, LONG)))
+    np.testing.assert_array_equal(quiet, grey_values(star_light(ORION, LENS, LONG), chip.IDEAL))
     assert quiet.flags.c_contiguous
 
 

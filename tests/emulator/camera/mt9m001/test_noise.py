@@ -12,6 +12,7 @@ from cubestack.emulator.camera.common.view import SkyCondition
 from cubestack.emulator.camera.mt9m001 import imager
 from cubestack.emulator.camera.mt9m001.lens import CONDITION
 from cubestack.emulator.camera.mt9m001.registers import read_settings
+from cubestack.emulator.light.noise import FrameNoise
 from cubestack.firmware_model.interface.cameras.mt9m001 import REGISTERS
 
 SHAPE = (400, 500)
@@ -27,10 +28,9 @@ def frame(
     background: float = 15.0,
 ) -> np.ndarray:
     electrons = np.broadcast_to(np.float32(light), SHAPE)
-    generator = np.random.Generator(np.random.SFC64(1))
     settings = replace(read_settings(RegisterFile(REGISTERS)), gains=(gain,) * 4)
     made = imager.Mt9m001Imager(0, terms, background)
-    return made.counts(electrons, 1.0, condition, settings, generator)
+    return made.counts(electrons, 1.0, condition, settings, FrameNoise([1]))
 
 
 def quantisation_sigma(gain: float = 1.0) -> float:

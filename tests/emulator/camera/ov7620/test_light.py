@@ -6,6 +6,7 @@ import pytest
 from cubestack.emulator.camera.ov7620.fisheye import LENSES, undistort
 from cubestack.emulator.camera.ov7620.light import USUAL_EXPOSURE, scene_light
 from cubestack.emulator.camera.ov7620.luminance import BLACK, luminance, stuck_pixels
+from cubestack.emulator.light.noise import FrameNoise
 from cubestack.emulator.scene.earth_sun import CameraTarget, EarthSunScene, Mounting, Reflection
 from cubestack.emulator.scene.hazards import Ghosts, Glint, Moon
 from cubestack.emulator.scene.hazards.contract import EARTH_RADIANCE
@@ -204,8 +205,7 @@ def test_luminance_has_black_level_34_and_saturates() -> None:
 )
 def test_noise_has_48_db_at_full_scale(light: float, gain: float, sigma: float) -> None:
     grey, same, other = (
-        luminance(flat(light), gain, np.random.default_rng(seed), NONE).astype(float)
-        for seed in (1, 1, 2)
+        luminance(flat(light), gain, FrameNoise([seed]), NONE).astype(float) for seed in (1, 1, 2)
     )
     np.testing.assert_array_equal(grey, same)
     assert np.any(grey != other)

@@ -1,0 +1,97 @@
+"""The compiled library of this package: its build, and its functions for ctypes.
+
+Without a library and a compiler, callers use NumPy.
+"""
+
+import ctypes
+import warnings
+from functools import cache, lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.emulator.light import noise
+from cubestack.emulator.native import cache as libraries
+from cubestack.emulator.native.compiler import Compiler, NoCompilerError, compile_library
+
+FOLDER = Path(__file__).parent
+
+OPTIONS = ("-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math")
+"""Loops in vectors, each operation rounded as in NumPy; neither errno nor traps are used."""
+
+Library = Any
+"""The loaded library with these functions."""
+
+
+class NoiseRecord(ctypes.Structure):
+    """``NoiseSource`` of noise.h."""
+
+    _fields_ = (
+        ("key", ctypes.c_uint64 * 2),
+        ("pieces", ctypes.c_void_p),
+        ("shift", ctypes.c_int32),
+        ("first", ctypes.c_int32),
+    )
+
+
+_P, _I, _L, _D = ctypes.c_void_p, ctypes.c_int32, ctypes.c_int64, ctypes.c_double
+_FUNCTIONS = {
+    "light_grey_values": (_P, _I, _I, _P),
+    "light_spots": (_P, _P, _L, _D, _I, _P, _I, _I, _P),
+}
+
+
+def light_library() -> Library | None:
+    """The library of this process; None, with a warning, where there is no C++ compiler.
+
+    Raises:
+        CompilerError: the compiler failed.
+    """
+    try:
+        return _loaded()
+    except NoCompilerError as error:
+        warnings.warn(f"{error}; light is computed by NumPy, which takes longer", stacklevel=1)
+        return None
+
+
+def address(array: NDArray[Any] | None) -> int | None:
+    """Where the numbers of ``array`` are, for a call."""
+    return None if array is None else array.__array_interface__["data"][0]
+
+
+def noise_of(frame: noise.FrameNoise | None) -> NoiseRecord:
+    """The noise of a frame for C++; zeros for none."""
+    if frame is None:
+        return NoiseRecord()
+    key = (ctypes.c_uint64 * 2)(*map(int, frame.key))
+    return NoiseRecord(key, address(_pieces()), noise.SHIFT, noise.FIRST)
+
+
+@cache
+def _pieces() -> NDArray[np.float32]:
+    """Level and slope of each piece side by side, (n, 2)."""
+    return np.ascontiguousarray(np.stack(noise.pieces(), axis=1))
+
+
+@cache
+def _loaded() -> Library:
+    library = ctypes.CDLL(str(library_path()))
+    for name, arguments in _FUNCTIONS.items():
+        function = getattr(library, name)
+        function.restype, function.argtypes = None, arguments
+    return library
+
+
+@lru_cache(maxsize=4)
+def library_path(folder: Path | None = None) -> Path:
+    """See :func:`cubestack.emulator.native.cache.library_of`."""
+    sources = sorted([*FOLDER.glob("*.cpp"), *FOLDER.glob("*.h")])
+    recipe = libraries.recipe("the light of scenes", " ".join(OPTIONS), sources, _compile)
+    return libraries.library_of(recipe, folder)
+
+
+def _compile(compiler: Compiler, scratch: Path, log: Path) -> Path:
+    units = sorted(FOLDER.glob("*.cpp"))
+    return compile_library(compiler, scratch / "library.so", log, [*OPTIONS, *map(str, units)])

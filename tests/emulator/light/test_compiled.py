@@ -1,0 +1,109 @@
+"""Compiled library and NumPy compute the same, to the byte."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cubestack.emulator.light import library, pixels, spots
+from cubestack.emulator.light.noise import FrameNoise
+from cubestack.emulator.light.pixels import PixelModel
+from cubestack.emulator.native import compiler
+from cubestack.emulator.native.compiler import find_compiler
+
+needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
+
+SHAPE = (37, 203)  # no multiple of anything
+PIXELS = SHAPE[0] * SHAPE[1]
+
+
+def random_model(seed: int) -> tuple[np.ndarray, PixelModel]:
+    """Light, and a sensor each of whose parts is there or not."""
+    rng = np.random.default_rng(seed)
+
+    def around(mean: float) -> np.ndarray:
+        return rng.normal(mean, 0.1 * abs(mean) + 0.1, SHAPE).clip(0).astype(np.float32)
+
+    def some(value: object) -> object:
+        return value if rng.random() < 0.6 else None
+
+    places = np.sort(rng.choice(PIXELS, 30))  # some twice
+    columns = np.sort(rng.choice(SHAPE[1] - 2, 20, replace=False)) + 1
+    parts = {
+        "response": some(around(1)),
+        "dark_share": some(around(1)),
+        "pattern": some(rng.normal(0, 3, SHAPE).astype(np.float32)),
+        "noise": some(FrameNoise([seed, 1])),
+        "hot": some(places),
+        "gain": some(rng.uniform(0.2, 3, (2, SHAPE[1])).astype(np.float32)),
+        "repaired": some(columns + SHAPE[1] * int(rng.integers(SHAPE[0]))),
+        "stuck": some(rng.choice(PIXELS, 9)),
+        "black": some(20.0),
+    }
+    model = PixelModel(**{name: one for name, one in parts.items() if one is not None})
+    model = replace(
+        model,
+        dark=float(rng.uniform(0, 40)),
+        hot_charge=rng.exponential(500, len(model.hot)).astype(np.float32),
+        shot=float(rng.uniform(0, 2)),
+        shot_of_light=model.response is not None or bool(rng.integers(2)),
+        steady=float(rng.uniform(0.1, 200)),
+        offset=float(rng.uniform(-5, 40)),
+        **[{}, {"full_scale": 4095, "step": 1 / 16}, {"full_scale": 1023, "step": 0.25}][seed % 3],
+    )
+    return (rng.exponential(300, SHAPE)).astype(np.float32), model
+
+
+@needs_compiler
+@pytest.mark.parametrize("seed", range(30))
+def test_grey_values_are_equal(seed: int) -> None:
+    light, model = random_model(seed)
+    before = light.copy()
+    expected = pixels.reference(light, model)
+    assert len(np.unique(expected)) > 10
+    np.testing.assert_array_equal(pixels.compiled(library.light_library(), light, model), expected)
+    np.testing.assert_array_equal(light, before)
+
+
+@needs_compiler
+@pytest.mark.parametrize("rows", [(0, 1), (1, 4), (17, 37)])
+def test_rows_do_not_depend_on_which_others_are_computed(rows: tuple[int, int]) -> None:
+    for seed in range(6):
+        light, model = random_model(seed)
+        some = pixels.compiled(library.light_library(), light, model, rows)
+        np.testing.assert_array_equal(some, pixels.reference(light, model)[slice(*rows)])
+
+
+@needs_compiler
+@pytest.mark.parametrize("sigma_px", [0.4, 1.5, 6.0, 20.0])
+def test_spots_are_equal(sigma_px: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(int(10 * sigma_px))
+    places = rng.uniform(-30, 240, (300, 2))
+    places[:5], places[5:9] = np.rint(places[:5]), np.nan
+    charge = rng.exponential(1e4, 300)
+    found = spots.spots(places, charge, sigma_px, SHAPE)
+    monkeypatch.setattr(spots, "light_library", lambda: None)
+    monkeypatch.setattr(spots, "CELLS_AT_ONCE", 100_000)
+    expected = spots.spots(places, charge, sigma_px, SHAPE)
+    assert expected.max() > 0
+    np.testing.assert_array_equal(found, expected)
+
+
+def test_no_spots_leave_the_sensor_dark() -> None:
+    assert not spots.spots(np.zeros((0, 2)), np.zeros(0), 1.0, SHAPE).any()
+
+
+def test_without_a_compiler_numpy_is_used_and_one_line_says_so(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    light, model = random_model(1)
+    monkeypatch.setattr(compiler, "find_compiler", lambda: None)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    library.library_path.cache_clear()
+    monkeypatch.setattr(library, "_loaded", library._loaded.__wrapped__)
+    with pytest.warns(UserWarning, match=re.escape("light is computed by NumPy")) as warned:
+        grey = pixels.grey_values(light, model)
+    assert len(warned) == 1
+    np.testing.assert_array_equal(grey, pixels.reference(light, model))
