@@ -36,10 +36,26 @@ class NoiseRecord(ctypes.Structure):
     )
 
 
+class GlobeRecord(ctypes.Structure):
+    """``Globe`` of globe.cpp."""
+
+    _fields_ = (
+        *((name, ctypes.c_float) for name in ("limit", "distance", "square", "twilight")),
+        *((name, ctypes.c_float) for name in ("cosine", "sine", "per_height", "unevenness")),
+        *((name, ctypes.c_float * 3) for name in ("centre", "closest", "sun")),
+        ("sine_series", ctypes.c_float * 6),
+        ("exp2_series", ctypes.c_float * 7),
+        *((name, ctypes.c_float) for name in ("to_whole", "log2_e", "smallest")),
+        ("waves", ctypes.c_int32),
+        ("table", ctypes.c_void_p),
+    )
+
+
 _P, _I, _L, _D = ctypes.c_void_p, ctypes.c_int32, ctypes.c_int64, ctypes.c_double
-_FUNCTIONS = {
-    "light_grey_values": (_P, _I, _I, _P),
-    "light_spots": (_P, _P, _L, _D, _I, _P, _I, _I, _P),
+_FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
+    "light_grey_values": (None, (_P, _I, _I, _P)),
+    "light_spots": (None, (_P, _P, _L, _D, _I, _P, _I, _I, _P)),
+    "light_globe": (_L, (_P, _P, _P, _L, _P, _P)),
 }
 
 
@@ -78,9 +94,9 @@ def _pieces() -> NDArray[np.float32]:
 @cache
 def _loaded() -> Library:
     library = ctypes.CDLL(str(library_path()))
-    for name, arguments in _FUNCTIONS.items():
+    for name, (result, arguments) in _FUNCTIONS.items():
         function = getattr(library, name)
-        function.restype, function.argtypes = None, arguments
+        function.restype, function.argtypes = result, arguments
     return library
 
 

@@ -16,6 +16,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.emulator.light import globe as lit
+
 EARTH_RADIUS_KM = 6378.136
 
 TWILIGHT = 0.05
@@ -71,69 +73,34 @@ class Earth:
             Indices (m,) of the lines of sight that meet the Earth or its glow, ascending, and
             radiance (m,).
         """
-        radius = np.radians(angular_radius_deg(self.altitude_km))
-        towards_earth = vectors @ nadir.astype(np.float32)
-        reach = float(pixel_rad.max()) + self.glow_heights * self._glow / self._rise(radius)
-        hit = np.flatnonzero(towards_earth > np.cos(radius + reach))
-        cosine, sight = towards_earth[hit], vectors[hit]
-        normal = self._normal(sight, cosine, nadir)
-        light = _daylight(normal @ sun.astype(np.float32))
-        light *= self._share(cosine, pixel_rad[hit], radius)
-        if self.unevenness:
-            light *= np.maximum(1 + self._pattern(normal, axes), 0)
+        globe = self._globe(nadir, sun, axes)
+        hit, light = lit.radiance(vectors, pixel_rad, globe)
         if self.shine is not None:
-            light *= self.shine(normal @ axes.astype(np.float32))
+            light *= self.shine(lit.normals(vectors[hit], globe) @ axes.astype(np.float32))
         return hit, light
 
-    def _normal(self, sight: Values, cosine: Values, nadir: NDArray[np.float64]) -> Values:
-        """First intersection (n, 3) of each line of sight with the sphere, or its closest point."""
-        d = np.float32(self.distance)
-        half_chord = np.sqrt(np.maximum(1 - d * d * (1 - cosine * cosine), 0))
-        point = sight * (d * cosine - half_chord)[:, None]
-        point -= (self.distance * nadir).astype(np.float32)
-        return np.asarray(point, np.float32)
-
-    @property
-    def _glow(self) -> float:
-        return self.glow_km / EARTH_RADIUS_KM
-
-    def _rise(self, radius: float) -> float:
-        """Height of the line of sight above the limb per angle, in Earth radii per radian."""
-        return self.distance * float(np.cos(radius))
-
-    def _share(self, cosine: Values, pixel_rad: Values, radius: float) -> Values:
-        """Share of each pixel that the surface fills, plus the glow's light in the rest."""
-        # Angle above the limb in pixels, linear in the cosine, which is accurate near the limb.
-        above = (np.float32(np.cos(radius)) - cosine) / (np.float32(np.sin(radius)) * pixel_rad)
-        share = np.clip(np.float32(0.5) - above, 0, 1)
-        if self._glow:
-            limb = np.flatnonzero(above > -0.5)
-            pixel = pixel_rad[limb] * np.float32(self._rise(radius) / self._glow)
-            low, high = (np.maximum(above[limb] + half, 0) * pixel for half in (-0.5, 0.5))
-            share[limb] += (np.exp(-low) - np.exp(-high)) / pixel
-        return np.asarray(share, np.float32)
+    def _globe(
+        self, nadir: NDArray[np.float64], sun: NDArray[np.float64], axes: NDArray[np.float64]
+    ) -> lit.Globe:
+        vectors, phases = self._waves
+        return lit.Globe(
+            distance=self.distance,
+            centre=nadir,
+            sun=sun,
+            twilight=TWILIGHT,
+            glow=self.glow_km / EARTH_RADIUS_KM,
+            glow_heights=self.glow_heights,
+            waves=vectors @ axes.T,
+            phases=phases,
+            # Each cosine has the variance 1/2.
+            unevenness=self.unevenness * np.sqrt(2 / WAVES),
+        )
 
     @cached_property
-    def _waves(self) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
-        """Wave vectors (WAVES, 3) in 1 / Earth radius and phases (WAVES,)."""
+    def _waves(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Wave vectors (WAVES, 3) in turns per Earth radius, and phases (WAVES,) in turns."""
         generator = np.random.default_rng([self.seed, 0xEA127])
         direction = generator.standard_normal((WAVES, 3))
         direction /= np.linalg.norm(direction, axis=1, keepdims=True)
         length_km = np.geomspace(LONGEST_KM, SHORTEST_KM, WAVES)
-        phase = generator.uniform(0, 2 * np.pi, WAVES).astype(np.float32)
-        return direction * (2 * np.pi * EARTH_RADIUS_KM / length_km)[:, None], phase
-
-    def _pattern(self, normal: Values, axes: NDArray[np.float64]) -> Values:
-        """Relative deviation (n,) of the surface's brightness from its mean."""
-        vectors, phases = self._waves
-        total = np.zeros(len(normal), np.float32)
-        for vector, phase in zip((vectors @ axes.T).astype(np.float32), phases, strict=True):
-            total += np.cos(normal @ vector + phase)
-        # Each cosine has the variance 1/2.
-        total *= np.float32(self.unevenness * np.sqrt(2 / WAVES))
-        return total
-
-
-def _daylight(sine: Values) -> Values:
-    """Light on the ground from the sine of the Sun's height: the sine by day, 0 at night."""
-    return np.asarray((sine + np.sqrt(sine * sine + np.float32(TWILIGHT**2))) / 2, np.float32)
+        return direction * (EARTH_RADIUS_KM / length_km)[:, None], generator.uniform(0, 1, WAVES)
