@@ -1,11 +1,7 @@
-"""The compiled library of this package: its build, and its functions for ctypes.
-
-Without a library and a compiler, callers use NumPy.
-"""
+"""The compiled library of this package, declared for ctypes; without it, callers use NumPy."""
 
 import ctypes
-import warnings
-from functools import cache, lru_cache
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.emulator.light import noise
-from cubestack.emulator.native import cache as libraries
-from cubestack.emulator.native.compiler import Compiler, NoCompilerError, compile_library
+from cubestack.emulator.native.inner_loops import inner_loops
 
 FOLDER = Path(__file__).parent
 
-OPTIONS = ("-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math")
-"""Loops in vectors, each operation rounded as in NumPy; neither errno nor traps are used."""
+TITLE = "the inner loops of light"
 
 Library = Any
 """The loaded library with these functions."""
@@ -59,17 +53,22 @@ _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
 }
 
 
+_library: Library | None = None
+
+
 def light_library() -> Library | None:
     """The library of this process; None, with a warning, where there is no C++ compiler.
 
     Raises:
         CompilerError: the compiler failed.
     """
-    try:
-        return _loaded()
-    except NoCompilerError as error:
-        warnings.warn(f"{error}; light is computed by NumPy, which takes longer", stacklevel=1)
-        return None
+    global _library
+    if _library is None:
+        _library = inner_loops(TITLE, [*FOLDER.glob("*.cpp"), *FOLDER.glob("*.h")])
+        for name, (result, arguments) in _FUNCTIONS.items() if _library is not None else ():
+            function = getattr(_library, name)
+            function.restype, function.argtypes = result, arguments
+    return _library
 
 
 def address(array: NDArray[Any] | None) -> int | None:
@@ -89,25 +88,3 @@ def noise_of(frame: noise.FrameNoise | None) -> NoiseRecord:
 def _pieces() -> NDArray[np.float32]:
     """Level and slope of each piece side by side, (n, 2)."""
     return np.ascontiguousarray(np.stack(noise.pieces(), axis=1))
-
-
-@cache
-def _loaded() -> Library:
-    library = ctypes.CDLL(str(library_path()))
-    for name, (result, arguments) in _FUNCTIONS.items():
-        function = getattr(library, name)
-        function.restype, function.argtypes = result, arguments
-    return library
-
-
-@lru_cache(maxsize=4)
-def library_path(folder: Path | None = None) -> Path:
-    """See :func:`cubestack.emulator.native.cache.library_of`."""
-    sources = sorted([*FOLDER.glob("*.cpp"), *FOLDER.glob("*.h")])
-    recipe = libraries.recipe("the light of scenes", " ".join(OPTIONS), sources, _compile)
-    return libraries.library_of(recipe, folder)
-
-
-def _compile(compiler: Compiler, scratch: Path, log: Path) -> Path:
-    units = sorted(FOLDER.glob("*.cpp"))
-    return compile_library(compiler, scratch / "library.so", log, [*OPTIONS, *map(str, units)])

@@ -9,8 +9,11 @@ from pathlib import Path
 from cubestack.emulator.native.cache import library_of, recipe
 from cubestack.emulator.native.compiler import Compiler, NoCompilerError, compile_library
 
-FLAGS = ("-O3", "-ffp-contract=off")
-"""No multiplication is fused with an addition, so that numbers are rounded as NumPy rounds them."""
+FLAGS = ("-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math")
+"""No multiplication is fused with an addition, so that numbers are rounded as NumPy rounds them.
+
+Neither errno nor traps are used, so that loops with roots and conditions run in vectors.
+"""
 
 
 def inner_loops(title: str, sources: Iterable[Path]) -> ctypes.CDLL | None:

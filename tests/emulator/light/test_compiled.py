@@ -1,17 +1,19 @@
 """Compiled library and NumPy compute the same, to the byte."""
 
-import re
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from cubestack.emulator.camera.mlx75412.sensor import Mlx75412
 from cubestack.emulator.light import globe, library, pixels, spots
 from cubestack.emulator.light.noise import FrameNoise
 from cubestack.emulator.light.pixels import PixelModel
 from cubestack.emulator.native import compiler
+from cubestack.emulator.native.cache import collected
 from cubestack.emulator.native.compiler import find_compiler
+from cubestack.emulator.scene.sky import SkyScene
 
 needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
 
@@ -131,9 +133,16 @@ def test_without_a_compiler_numpy_is_used_and_one_line_says_so(
     light, model = random_model(1)
     monkeypatch.setattr(compiler, "find_compiler", lambda: None)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    library.library_path.cache_clear()
-    monkeypatch.setattr(library, "_loaded", library._loaded.__wrapped__)
-    with pytest.warns(UserWarning, match=re.escape("light is computed by NumPy")) as warned:
+    monkeypatch.setattr(library, "_library", None)
+    line = "^no C.. compiler found .*; the inner loops of light run in Python"
+    with pytest.warns(UserWarning, match=line) as warned:
         grey = pixels.grey_values(light, model)
     assert len(warned) == 1
     np.testing.assert_array_equal(grey, pixels.reference(light, model))
+
+
+def test_a_wheel_has_the_loops(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(library, "_library", None)
+    with collected() as wanted, pytest.warns(UserWarning, match="only listed"):
+        Mlx75412(SkyScene.pointing(0.0, 0.0))
+    assert [one.title for one in wanted] == [library.TITLE]
