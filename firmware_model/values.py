@@ -18,6 +18,11 @@ from typing import Any, ClassVar
 REQUIRED: Any = object()
 """Default of a value that must be given."""
 
+
+LARGEST_WHOLE = 2**63 - 1
+LONGEST_SHOWN = 60
+"""Characters of a wrong value in an error."""
+
 _OTHER = (ArithmeticError, LookupError, TypeError, ValueError)
 """What reading a value of another type raises."""
 
@@ -168,6 +173,8 @@ class Declaration:
             raise self.error(given) from None
         if not self.fits(value):
             raise self.error(given, self.limits)
+        if self.kind is WHOLE and abs(value) > LARGEST_WHOLE:
+            raise self.error(given, f"{self.wanted} of 64 bits")
         return value if self.make is None else self.make(value)
 
     def parse(self, given: str) -> Any:
@@ -193,7 +200,9 @@ class Declaration:
 
     def error(self, given: Any, wanted: str = "") -> ValueError:
         """The error for a value that is not allowed; whoever catches it puts the name in front."""
-        shown = repr(given) if isinstance(given, str) else given
+        shown = repr(given) if isinstance(given, str) else str(given)
+        if len(shown) > LONGEST_SHOWN:
+            shown = f"{shown[:LONGEST_SHOWN]}… ({len(shown)} characters)"
         return ValueError(f"must be {wanted or self.wanted}, not {shown}")
 
     def described(self) -> dict[str, Any]:

@@ -99,6 +99,8 @@ def rebased(text: str, folder: Path) -> str:
 def _add(found: _Found, path: Path, name: str) -> None:
     if not path.exists():
         raise GatewareError(f"gateware {name} does not exist")
+    if path.is_fifo():
+        raise GatewareError(f"gateware {name} is a pipe; give a file")
     suffix = path.suffix.lower()
     if path.is_dir():
         found.includes.append(path)

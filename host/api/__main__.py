@@ -2,6 +2,6 @@
 
 import sys
 
-from cubestack.host.cli.main import main
+from cubestack.host.cli.start import main
 
 sys.exit(main())

@@ -2,16 +2,38 @@
 
 import argparse
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from difflib import get_close_matches
 from importlib.metadata import metadata
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar
 
+from cubestack.firmware_model.formats.untrusted import shown
 from cubestack.firmware_model.values import FLAG, Declaration, ListDeclaration
 from cubestack.host.options import Options, option_string
 
 OptionsT = TypeVar("OptionsT", bound=Options)
+
+
+MISSING = "the following arguments are required"
+"""How argparse's error begins."""
+
+MOST_LISTED = 12
+"""Choices that an error lists."""
+
+LONGEST_ERROR = 1000
+
+
+def one_line(text: str) -> str:
+    """A text as one line of bounded length, whatever names are in it."""
+    line = shown(text)
+    return line if len(line) <= LONGEST_ERROR else f"{line[:LONGEST_ERROR]}…"
+
+
+def suggestion(word: str, known: Iterable[str]) -> str:
+    """The end of an error about a misspelt word; empty if no known one is like it."""
+    close = get_close_matches(word, list(known), 1)
+    return f"; did you mean {close[0]}?" if close else ""
 
 
 class _Formatter(argparse.RawDescriptionHelpFormatter):
@@ -39,11 +61,37 @@ class Parser(argparse.ArgumentParser):
             command, flag = parsed.own_parser, unknown[0].partition("=")[0]
             if owners := getattr(parsed, "others", {}).get(flag):
                 command.error(f"{flag} is an option of {', '.join(owners)}, not of this device")
-            known = [flag for action in command._actions for flag in action.option_strings]
-            close = get_close_matches(flag, known, 1)
-            hint = f"; did you mean {close[0]}?" if close else ""
-            command.error(f"unknown argument {' '.join(unknown)}{hint}")
+            command.unknown(unknown)
         return parsed
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """As argparse's; keeps the words for an error."""
+        self._given = list(args or ())
+        return super().parse_known_args(args, namespace)
+
+    def unknown(self, words: Sequence[str]) -> NoReturn:
+        """Exit: this command does not know these words."""
+        known = [flag for action in self._actions for flag in action.option_strings]
+        hint = suggestion(words[0].partition("=")[0], known)
+        self.error(f"unknown argument {' '.join(words)}{hint}")
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        """Raise the error of a value that is no choice: the nearest one, or all if they are few."""
+        choices = None if action.choices is None else [str(one) for one in action.choices]
+        if choices is None or value in (action.choices or ()):
+            return
+        hint = suggestion(str(value), choices)
+        if isinstance(action, argparse._SubParsersAction):
+            what = f"no {str(action.metavar).lower()} {value!r}"
+            if hint:
+                near = action.choices[get_close_matches(str(value), choices, 1)[0]]
+                self.exit(2, f"{self.prog}: {one_line(what)}{hint}; see {near.prog} --help\n")
+            few = f"; there are {', '.join(choices)}" if len(choices) <= MOST_LISTED else ""
+            self.error(f"{what}{few}")
+        if not action.option_strings:
+            self._check_flags()  # it may be the value of a misspelt one
+        few = f"one of {', '.join(choices)}, " if len(choices) <= MOST_LISTED or not hint else ""
+        raise argparse.ArgumentError(action, f"must be {few}not {value!r}{hint}")
 
     def format_help(self) -> str:
         """The help, with the address of the documents if it names one: they aren't installed."""
@@ -51,7 +99,18 @@ class Parser(argparse.ArgumentParser):
         return f"{text}\ndocs/: {_documents()}\n" if "docs/" in text else text
 
     def error(self, message: str) -> NoReturn:
-        self.exit(2, f"{self.prog}: {message}; see {self.prog} --help\n")
+        if message.startswith(MISSING):
+            self._check_flags()
+        self.exit(2, f"{self.prog}: {one_line(message)}; see {self.prog} --help\n")
+
+    def _check_flags(self) -> None:
+        """Exit if a flag is unknown: what seems to be missing may be its value."""
+        words = [word for word in self._given if word.startswith("--") and word != "--"]
+        for word in words:
+            flag = word.partition("=")[0]
+            if flag not in self._option_string_actions and not self._get_option_tuples(flag):
+                self._given = []
+                self.unknown([word])
 
 
 def _documents() -> str:

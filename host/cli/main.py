@@ -8,12 +8,12 @@ import logging
 import signal
 import sys
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib.metadata import version
 from io import TextIOWrapper
 
-from cubestack.firmware_model.formats.untrusted import shown_lines
+from cubestack.firmware_model.formats.untrusted import shown, shown_lines
 from cubestack.host.cli.arguments import Parser
 from cubestack.host.cli.commands import BUILT_IN, Listed, commands, reports, with_headings
 from cubestack.host.devices.registry import device_names
@@ -102,8 +102,13 @@ def _loudness(verbose: int, *, quiet: bool) -> Iterator[None]:
         hush(False)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line ``arguments`` (default: the process's own); returns the exit status."""
+def main(
+    arguments: Sequence[str] | None = None, on_start: Callable[[], object] = lambda: None
+) -> int:
+    """Run the command line ``arguments`` (default: the process's own); returns the exit status.
+
+    ``on_start`` is called when KeyboardInterrupt is handled.
+    """
     if arguments is None:
         _end_in_order()
         _write_anywhere()
@@ -111,6 +116,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     asked = next((word for word in given if not word.startswith("-")), None)
     args = make_parser(asked or "").parse_args(given)
     try:
+        on_start()
         with _loudness(args.verbose, quiet=args.quiet), warnings.catch_warnings():
             warnings.showwarning = lambda text, *_, **__: say(f"cubestack {args.command}: {text}")
             return int(args.run(args) or DONE)
@@ -119,12 +125,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         return FAILED
     except ValueError as error:  # all bad input is a ValueError with a full sentence
-        print(f"cubestack {args.command}: {shown_lines(str(error))}", file=sys.stderr)
-        return WRONG_CALL
+        return _fail(args.command, str(error), WRONG_CALL)
     except OSError as error:
-        named = f"{error.filename}: {error.strerror}" if error.filename else error
-        print(f"cubestack {args.command}: {shown_lines(str(named))}", file=sys.stderr)
-        return FAILED
+        named = f"{error.filename}: {error.strerror}" if error.filename else error.strerror
+        return _fail(args.command, named or str(error))
+    except MemoryError:
+        return _fail(args.command, "there is not enough memory for this")
     except RuntimeError as error:
         from cubestack.emulator.native.compiler import CompilerError
 
@@ -134,5 +140,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return FAILED
 
 
+def _fail(command: str, text: str, status: int = FAILED) -> int:
+    """Print an error as one line, whatever names are in it; returns the exit status."""
+    print(f"cubestack {command}: {shown(text)}", file=sys.stderr)
+    return status
+
+
 if __name__ == "__main__":
-    sys.exit(main())
+    from cubestack.host.cli import start
+
+    sys.exit(start.main())

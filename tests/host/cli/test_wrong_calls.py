@@ -11,7 +11,12 @@ FAILED, WRONG_CALL = 1, 2
     "wrong",
     [
         ("", "COMMAND"),
-        ("launch", "launch", "measure"),
+        ("launch", "no command 'launch'; see cubestack --help"),
+        ("emulat", "no command 'emulat'; did you mean emulate?; see cubestack emulate --help"),
+        ("--versoin", "unknown argument --versoin; did you mean --version?; see cubestack --help"),
+        ("emulate --paice fast", "--paice; did you mean --pace?; see cubestack emulate --help"),
+        ("hdl prov", "did you mean prove?; see cubestack hdl prove --help"),
+        ("export cubestar --format xcte", "--format: must be", "did you mean xtce?"),
         ("measure", "device"),
         ("measure cubestarr", "cubestarr", "cubestar"),
         ("measure cubestar --profle extended", "did you mean --profile?; see cubestack measure"),

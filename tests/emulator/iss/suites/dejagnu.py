@@ -60,7 +60,7 @@ GCC = Suite(
     "gcc-arm-none-eabi-source",
     "usr/src/gcc-arm-none-eabi-source.tar.xz",
     "gcc/testsuite",
-    ("lib/*", "config/*", "gcc.c-torture/execute/*", "gcc.dg/fixed-point/*"),
+    ("lib/*", "config/*", "gcc.c-torture/execute/*", "gcc.dg/fixed-point/*", "gcc.dg/*.h"),
     "gcc",
     ("execute.exp", "ieee.exp", "builtins.exp", "fixed-point.exp"),
 )

@@ -19,10 +19,14 @@ TIMEOUT_S = 1000
 PROCESSOR_S = 250
 TIMED_OUT = 124
 
+TEMPORARY = "/tmp"
+"""Where newlib's tmpnam places files."""
+
 
 def run(program: str) -> int:
     """Run an ELF file until it exits; prints its output, returns its exit status."""
-    with cubestack.open_device("efm32gg", firmware=program, semihosting=True) as part:
+    options = {"semihosting": True, "semihosting_root": TEMPORARY}
+    with cubestack.open_device("efm32gg", firmware=program, **options) as part:
         try:
             ended = part.run_to_exit(TIMEOUT_S)
         except TimeoutError as error:

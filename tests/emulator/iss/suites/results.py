@@ -10,7 +10,7 @@ RESULT = re.compile(r"(PASS|FAIL|UNSUPPORTED|UNRESOLVED|XPASS|XFAIL|ERROR|WARNIN
 RAN = re.compile(r"(execution( test)?|output)\b")
 """The words of results of a run; others are of the compiler."""
 
-DECLARED_NEEDS = re.compile(r"dg-require-effective-target\s+\"?(\w+)")
+DECLARED_NEEDS = re.compile(r"dg-require-(?:effective-target\s+\"?)?([\w-]+)")
 STACK = "the stack is larger than RAM"
 MEMORY = re.compile(r"region .*(overflowed|is full)|will not fit in region")
 LIBRARY = re.compile(

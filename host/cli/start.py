@@ -1,0 +1,36 @@
+"""Start of the command: Ctrl-C ends it with status 130, also while its modules are loaded.
+
+The script ``cubestack`` beside this file blocks the signal until then. With ``python -m cubestack``
+Ctrl-C prints a traceback while the interpreter starts.
+"""
+
+import os
+import signal
+from types import FrameType
+
+INTERRUPTED = 128 + signal.SIGINT
+
+
+def main() -> int:
+    """Run the process's own command line; returns the exit status."""
+    before = signal.getsignal(signal.SIGINT)
+    ignored = before is not signal.default_int_handler
+    if not ignored:
+        signal.signal(signal.SIGINT, _end)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})  # the script has blocked it
+    if ignored:
+        from cubestack.host.cli.main import main as run
+
+        return run()
+    try:
+        from cubestack.host.cli.main import main as run
+
+        return run(on_start=lambda: signal.signal(signal.SIGINT, before))
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    finally:
+        signal.signal(signal.SIGINT, _end)  # a second one while the interpreter ends
+
+
+def _end(_number: int, _frame: FrameType | None) -> None:
+    os._exit(INTERRUPTED)

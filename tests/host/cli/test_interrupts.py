@@ -1,0 +1,67 @@
+"""Ctrl-C at any moment of a command, also while Python and its modules are loaded."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.tiers import quick
+
+SCRIPT = Path(__file__).parents[3] / "host" / "cli" / "cubestack"
+ENV = {**os.environ, "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
+ENDED_S = 60.0
+
+COMMANDS = (
+    "--version",
+    "measure cubestar --frames 500",
+    "measure aramis --frames 500",
+    "emulate cubesense --tcp 0",
+    "registers cubestar",
+    "export cubestar --format xtce",
+    "shell emulated:cubestar -c list",
+    "conformance emulated:aramis",
+    "catalogue cubestar",
+    "hdl area cubestar",
+)
+MOMENTS = 50
+
+CASES = [
+    (words, moment / MOMENTS * last_s)
+    for words in COMMANDS
+    for last_s in (0.4 if words.startswith("-") else 1.5,)
+    for moment in range(MOMENTS)
+]
+
+
+def _heard() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # nohup or a script's & would ignore it
+
+
+def _can_block() -> bool:
+    env = shutil.which("env") or ""
+    return subprocess.run([env, "--block-signal=INT", "true"], capture_output=True).returncode == 0
+
+
+@pytest.mark.skipif(not _can_block(), reason="this env can not block signals")
+@pytest.mark.parametrize(("words", "after_s"), quick(CASES, 10))
+def test_ctrl_c_ends_the_command_in_order(words: str, after_s: float, tmp_path: Path) -> None:
+    call = [SCRIPT, *words.split()]
+    pipe = subprocess.PIPE
+    with subprocess.Popen(
+        call, stdin=subprocess.DEVNULL, stdout=pipe, stderr=pipe, cwd=tmp_path, env=ENV,
+        text=True, preexec_fn=_heard,
+    ) as process:  # fmt: skip
+        try:
+            _, said = process.communicate(timeout=after_s)
+        except subprocess.TimeoutExpired:
+            process.send_signal(signal.SIGINT)
+            _, said = process.communicate(timeout=ENDED_S)
+            served = "Ctrl-C ends it" in said
+            # A shell shows 130, too, for one that the signal ends before the script's first line.
+            assert process.returncode in ((0,) if served else (130, -signal.SIGINT))
+    assert "Traceback" not in said
+    assert "KeyboardInterrupt" not in said

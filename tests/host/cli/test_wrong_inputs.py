@@ -1,0 +1,47 @@
+"""Every argument of every command refuses wrong inputs in one line of plain words."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from .wrong_inputs import TEXTS, arguments, cases, problem
+
+
+def tried(count: int, seed: int) -> subprocess.CompletedProcess[str]:
+    call = [sys.executable, "-m", "tests.host.cli.wrong_inputs", str(count), str(seed)]
+    return subprocess.run(call, capture_output=True, text=True, timeout=900)
+
+
+def test_cases_cover_every_argument(tmp_path: Path) -> None:
+    kinds = {one.kind.rpartition(":")[0] for one in cases(tmp_path)}
+    assert len(kinds) == len({(one.command, one.name) for one in arguments()}) > 400
+    assert len(cases(tmp_path)) > len(kinds) * len(TEXTS)
+
+
+@pytest.mark.parametrize(
+    ("status", "said"),
+    [
+        (1, "Traceback (most recent call last):\n"),
+        (2, "cubestack measure: 'utf-8' codec can't decode byte 0x89\n"),
+        (1, "cubestack measure: one\nand more\n"),
+        (99, "cubestack measure: x\n"),
+        (2, "x: no such file\n"),
+    ],
+)
+def test_bad_ends_are_noticed(status: int, said: str) -> None:
+    assert problem(status, said)
+
+
+def test_a_few_wrong_inputs_are_refused_in_one_line() -> None:
+    done = tried(30, 1)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize("seed", [2, 3])
+def test_wrong_inputs_are_refused_in_one_line(seed: int) -> None:
+    done = tried(200, seed)
+    assert done.returncode == 0, done.stdout + done.stderr
