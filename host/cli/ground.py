@@ -32,7 +32,7 @@ from cubestack.host.cli.device_options import (
 from cubestack.host.cli.ports import LAST_PORT
 from cubestack.host.devices.registry import device_names
 from cubestack.host.errors import TargetError
-from cubestack.host.targets import EMULATED, FORMS, open_target
+from cubestack.host.targets import EMULATED, FORMS, device_of, open_target
 from cubestack.host.terminal import say
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda _number, _frame: ended.set())
     options = _options(args)
-    _check(args.targets, options, args.record)
+    _check(args.targets, args.device, options, args.record)
     with ExitStack() as stack:
         pool = stack.enter_context(ThreadPoolExecutor(len(args.targets)))
         sessions = [pool.submit(_open, text, options, args) for text in args.targets]
@@ -83,21 +83,26 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _check(targets: Sequence[str], options: Mapping[str, Any], record: Path | None) -> None:
+def _check(
+    targets: Sequence[str], device: str | None, options: Mapping[str, Any], record: Path | None
+) -> None:
     """TargetError for a device that can not be emulated, and options that are for none."""
     emulated = [one.removeprefix(EMULATED) for one in targets if one.startswith(EMULATED)]
     for name in emulated:
         if name not in device_names():
             known = ", ".join(EMULATED + one for one in device_names())
             raise TargetError(f"no device {name!r} can be emulated; known: {known}")
+    from cubestack.host.ground.playback import is_recording
+
+    for text in targets:
+        if not text.startswith(EMULATED) and not is_recording(text):
+            device_of(device, text)
     if options and not emulated:
         from cubestack.host.ground.emulators import words
 
         raise TargetError(f"{' '.join(words(options))} is for emulated:DEVICE")
     if record is None:
         return
-    from cubestack.host.ground.playback import is_recording
-
     if len(targets) > 1 or emulated or is_recording(targets[0]):
         raise TargetError(f"--record {record} is for one device that is not emulated here")
 

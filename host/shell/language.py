@@ -14,7 +14,7 @@ from cubestack.firmware_model.interface.codec.message import MessageKind
 from cubestack.host.clients.diagnosis import why_silent
 from cubestack.host.errors import BadAnswerError, NoAnswerError
 from cubestack.host.shell.controls import LOG, ON_OFF, ControlCommands
-from cubestack.host.shell.names import CommandResult, Names, ShellCommand, ShellError
+from cubestack.host.shell.names import CommandResult, Names, ShellCommand, ShellError, check_count
 from cubestack.host.shell.ports import PortCommands
 from cubestack.host.shell.registers import RegisterCommands
 from cubestack.host.targets import Target
@@ -22,6 +22,8 @@ from cubestack.host.targets import Target
 __all__ = ["CommandResult", "Shell", "ShellError"]
 
 T = TypeVar("T")
+
+HELP = "help [COMMAND|NAME]"
 
 
 class Shell:
@@ -39,11 +41,13 @@ class Shell:
         self._answered = False
         self._silent_because: str | None = None
         self.on_row: Callable[[CommandResult], None] = lambda _result: None
+        self._registers = RegisterCommands(target, self._names, lambda row: self.on_row(row))
         commands = [
-            *RegisterCommands(target, self._names, lambda row: self.on_row(row)).commands(),
+            *self._registers.commands(),
             *PortCommands(target).commands(),
             *ControlCommands(target).commands(),
-            ShellCommand("help", "this list", self._help),
+            ShellCommand(HELP, "this list, or what a command or name is", self._help),
+            ShellCommand("quit", "end the shell; so do exit and Ctrl-D", lambda _: CommandResult()),
         ]
         self.commands = {command.name: command for command in commands}
 
@@ -97,19 +101,23 @@ class Shell:
         known = _arguments(self.target, self._names, before) if before else list(self.commands)
         return [found for found in known if found.lower().startswith(word.lower())]
 
-    def _help(self, _words: list[str]) -> CommandResult:
+    def _help(self, words: list[str]) -> CommandResult:
+        check_count(HELP, words, 0, 1)
+        if words and words[0] not in self.commands:
+            return self._registers.describe(words[0])
+        shown = [self.commands[word] for word in words] or list(self.commands.values())
         rows = [
             (command.usage, command.meaning + (" (emulated:)" if command.emulated_only else ""))
-            for command in self.commands.values()
+            for command in shown
         ]
-        return CommandResult(rows, {"commands": list(self.commands)})
+        return CommandResult(rows, {"commands": [command.name for command in shown]})
 
 
 def _arguments(target: Target, names: Names, before: list[str]) -> list[str]:
     command, arguments = before[0], before[1:]
     controls = target.controls
-    if command in ("read", "watch", "write", "list") and not arguments:
-        return names.of(command)
+    if command in ("read", "watch", "write", "list", "help") and not arguments:
+        return names.of("list" if command == "help" else command)
     if command == "read" and len(arguments) == 1:
         return [f.name for f in names.fields(arguments[0], MessageKind.TELEMETRY)]
     if command == "write":

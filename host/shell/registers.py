@@ -1,8 +1,9 @@
 """Shell commands on messages and registers: read, write, watch, dump, list."""
 
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import count
+from itertools import count, groupby
 
 from cubestack.firmware_model.interface.codec.field import Field, InterfaceError, Value
 from cubestack.firmware_model.interface.codec.message import Message, MessageKind
@@ -11,6 +12,7 @@ from cubestack.host.errors import NodeError
 from cubestack.host.export.field_text import field_details, field_type
 from cubestack.host.shell.names import (
     CommandResult,
+    Found,
     Names,
     ShellCommand,
     ShellError,
@@ -45,7 +47,7 @@ class RegisterCommands:
                 READ, "read a telemetry frame or register; NAME can be a number", self._read
             ),
             ShellCommand(WRITE, "send a telecommand, write a register", self._write),
-            ShellCommand(WATCH, "read repeatedly", self._watch),
+            ShellCommand(WATCH, "read repeatedly, with times", self._watch),
             ShellCommand(DUMP, "read all telemetry that has no side effect", self._dump),
             ShellCommand(LIST, "list all names, or the fields of one", self._list),
         ]
@@ -94,15 +96,24 @@ class RegisterCommands:
         found = self.names.need("watch", words[0], MessageKind.TELEMETRY)
         times = to_number("watch", words[1], 1) if len(words) > 1 else WATCH_COUNT
         period_s = to_number("watch", words[2], 0) if len(words) > 2 else WATCH_PERIOD_S
-        readings = []
+        readings, times_s = [], []
+        begun_s = self._now_s()
         for number in count(1):
             result = self._read(words[:1])
+            times_s.append(self._now_s() - begun_s)
             readings.append(result.data["values"])
+            result.rows.insert(0, ("", f"after {times_s[-1]:.3f} s"))
             self.on_row(result)
             if number >= times:
-                return CommandResult([], {"name": found.name, "readings": readings})
+                data = {"name": found.name, "readings": readings, "times_s": times_s}
+                return CommandResult([], data)
             self.target.node.pause(period_s)
         raise AssertionError
+
+    def _now_s(self) -> float:
+        """Virtual time of a device that is emulated here, else the time of this machine."""
+        controls = self.target.controls
+        return time.monotonic() if controls is None else controls.time_s()
 
     def _dump(self, words: list[str]) -> CommandResult:
         check_count(DUMP, words, 0, 0)
@@ -135,21 +146,35 @@ class RegisterCommands:
         if words:
             return self._list_one(words[0])
         found = self.names.all_of("list")
-        rows = [(number_of(one), one.name) for one in found]
+        rows: list[tuple[str, str]] = []
+        for title, ones in groupby(found, _title):
+            rows += [("", title), *((number_of(one), one.name) for one in ones)]
         return CommandResult(rows, {"names": [one.name for one in found]})
+
+    def describe(self, name: str) -> CommandResult:
+        """What a message or register is, in one line, and the names of its fields."""
+        what, fields = self._described("help", name)
+        names = [f.name for f in fields]
+        return CommandResult([("", what), ("", ", ".join(names))], {"fields": names})
+
+    def _described(self, command: str, name: str) -> tuple[str, tuple[Field, ...]]:
+        found = self.names.need(command, name, MessageKind.TELEMETRY, MessageKind.TELECOMMAND)
+        if isinstance(found, PointerRegister):
+            return f"register {found.address:#04x}, {found.access.value}", (found.field,)
+        text = f"{found.kind.value} {found.id}, {found.length} bytes: {found.meaning}"
+        return text, found.fields
 
     def _list_one(self, name: str) -> CommandResult:
         found = self.names.need("list", name, MessageKind.TELEMETRY, MessageKind.TELECOMMAND)
-        if isinstance(found, PointerRegister):
-            what = f"register {found.address:#04x}, {found.access.value}"
-            fields: tuple[Field, ...] = (found.field,)
-        else:
-            what = f"{found.kind.value} {found.id}, {found.length} bytes: {found.meaning}"
-            fields = found.fields
+        what, fields = self._described("list", name)
         rows = [(f.name, f"{field_type(f)}: {field_details(f)}") for f in fields]
         return CommandResult(
             [("", what), *rows], {"name": found.name, "fields": [f.name for f in fields]}
         )
+
+
+def _title(found: Found) -> str:
+    return "register:" if isinstance(found, PointerRegister) else f"{found.kind.value}:"
 
 
 def _plain(value: Value) -> object:

@@ -65,9 +65,12 @@ def silent_shell(request) -> Shell:
 
 def test_list_shows_the_number_of_every_name(silent_shell):
     listed = silent_shell.execute("list")
-    assert [name for _, name in listed.rows] == listed.data["names"]
-    assert len({number for number, _ in listed.rows}) == len(listed.rows)
-    for number, name in listed.rows:
+    named = [(number, name) for number, name in listed.rows if number]
+    assert [name for _, name in named] == listed.data["names"]
+    assert len({number for number, _ in named}) == len(named)
+    titles = [text for number, text in listed.rows if not number]
+    assert titles == ["telemetry:", "telecommand:", "register:"][: len(titles)]
+    for number, name in named:
         assert silent_shell.execute(f"list {number}").data["name"] == name
 
 
@@ -95,7 +98,19 @@ def test_watch_command_repeats_the_reading(sense, sense_shell):
     rows = []
     sense_shell.on_row = rows.append
     result = sense_shell.execute("watch Identification 3 0.1")
-    assert len(rows) == len(result.data["readings"]) == 3
+    assert len(rows) == len(result.data["readings"]) == len(result.data["times_s"]) == 3
+    assert [row.rows[0] for row in rows] == [
+        ("", f"after {time_s:.3f} s") for time_s in result.data["times_s"]
+    ]
+
+
+def test_help_of_a_name_is_short(sense_shell):
+    shown = sense_shell.execute("help CaptureAndDetect").rows
+    assert [text for _, text in shown][1:] == ["Camera, Sram"]
+    assert shown[0][1].startswith("telecommand 20, 2 bytes: ")
+    assert [name for name, _ in sense_shell.execute("help watch").rows] == [
+        "watch NAME [COUNT=10 [PERIOD_S=1]]"
+    ]
 
 
 def test_shell_image_command_saves_the_memory(node, shell, tmp_path):
@@ -198,7 +213,7 @@ def test_shell_completes_every_message_and_field_name(silent_shell):
     ("line", "found"),
     [
         ("", ["read", "write", "watch", "dump", "list", "image", "bench", "raw", "scene", "point",
-              "fault", "power", "time", "peek", "help"]),
+              "fault", "power", "time", "peek", "help", "quit"]),
         ("wa", ["watch"]),
         ("bench ", ["a", "q", "s", "w"]),
         ("fault ", ["latch-up", "camera", "log"]),
