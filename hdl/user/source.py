@@ -5,6 +5,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from cubestack.firmware_model.formats.untrusted import read_text
+
 #: Suffixes of files with Verilog and with SystemVerilog.
 VERILOG, SYSTEM_VERILOG = (".v",), (".sv",)
 
@@ -116,7 +118,7 @@ def _add(found: _Found, path: Path, name: str) -> None:
 
 def _add_list(found: _Found, path: Path, name: str) -> None:
     """Add what a list names: paths from its folder, +incdir+FOLDER, +define+NAME=VALUE."""
-    for line, words in _words(path.read_text(encoding="utf-8").splitlines()):
+    for line, words in _words(read_text(path, error=GatewareError).splitlines()):
         for word in words:
             if word.startswith("+incdir+"):
                 found.includes += [path.parent / part for part in word.split("+")[2:] if part]

@@ -147,6 +147,4 @@ def _fail(command: str, text: str, status: int = FAILED) -> int:
 
 
 if __name__ == "__main__":
-    from cubestack.host.cli import start
-
-    sys.exit(start.main())
+    sys.exit(main())
