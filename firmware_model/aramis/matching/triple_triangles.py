@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from cubestack.firmware_model.aramis.arrays import Floats, Indices, Mask
 from cubestack.firmware_model.aramis.catalogue.database import Database
 from cubestack.firmware_model.aramis.field import CameraField
+from cubestack.firmware_model.aramis.matching.ranges import triangles_within
 from cubestack.firmware_model.aramis.matching.triangles import (
     Triangle,
     charge_triangles,
@@ -120,9 +121,8 @@ class TripleTriangles:
     def _batch(self, batch: Indices, fewest: int, stretch: float) -> Iterator[Triangles]:
         corners, sigma = self._picture.directions[batch], self._sigma_rad[batch]
         measured = measure_triangles(corners, sigma)
-        found, looked_at = self._listed(measured, stretch)
-        listed = np.array([len(part) for part in found])
-        owner, triangles = np.repeat(np.arange(len(batch)), listed), np.concatenate(found)
+        triangles, listed, looked_at = self._listed(measured, stretch)
+        owner = np.repeat(np.arange(len(batch)), listed)
         reach = BOUND_SIGMAS * np.hypot(sigma[:, _FROM], sigma[:, _TO]) + CATALOGUE_RAD
         kept, orders, scales = self._same_sides(
             (measured.sides - reach)[owner],
@@ -159,8 +159,8 @@ class TripleTriangles:
 
     def _listed(
         self, measured: Triangle, stretch: float
-    ) -> tuple[list[NDArray[np.uint32]], NDArray[np.int_]]:
-        """Triangles within each one's bounds, and moments that were looked at (n,)."""
+    ) -> tuple[NDArray[np.uint32], Indices, NDArray[np.int_]]:
+        """Triangles within each one's bounds, their numbers (n,), and moments looked at (n,)."""
         database = self._database
 
         def bounds(of: Floats, middle: Any, sigma: Any, power: int) -> tuple[Indices, Indices]:
@@ -174,14 +174,9 @@ class TripleTriangles:
         most = MOST_STRETCHED if stretch else MOST_LISTED
         used = (measured.area >= SMALLEST_AREA) & (stop - start <= most)
         looked_at = np.where(used, stop - start, 0)
-        found = []
-        for index, count in enumerate(looked_at.tolist()):
-            part = database.moment_triangles[start[index] : start[index] + count]
-            part = part[(part >= first[index]) & (part < last[index])]
-            if self._hint is not None:
-                part = part[self._hint[2][database.faces[part]]]
-            found.append(part)
-        return found, looked_at
+        faces = None if self._hint is None else self._hint[2]
+        ranges = start, looked_at
+        return *triangles_within(database, ranges, (first, last), faces), looked_at
 
     def _same_sides(
         self,

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.aramis.arrays import Floats, Mask
 from cubestack.firmware_model.aramis.catalogue.database import Database
+from cubestack.firmware_model.aramis.matching.ranges import triangles_within
 from cubestack.firmware_model.aramis.matching.triangles import Triangle, measure_triangle
 from cubestack.firmware_model.interface.aramis import Reason
 from cubestack.firmware_model.mcu.costs import Meter
@@ -65,8 +66,9 @@ def find_triangles(
     moments = database.moment_index.find(database.moments, *bounds, meter)
     meter.charge(f32_mul=2, f32_add=4)
     # Triangles are in the order of their area, so the intersection is a comparison of indices.
-    found = database.moment_triangles[moments.start : moments.stop]
-    found = found[(found >= areas.start) & (found < areas.stop)]
+    first, last = np.array([areas.start]), np.array([areas.stop])
+    ranges = np.array([moments.start]), np.array([len(moments)])
+    found, _ = triangles_within(database, ranges, (first, last), None)
     meter.charge(ram_read=len(moments), i32_add=2 * len(moments), loop=len(moments))
     if faces is not None:
         meter.charge(ram_read=2 * len(found), loop=len(found))
