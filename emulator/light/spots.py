@@ -29,6 +29,11 @@ PHI = np.array(
 )
 
 
+def reach_px(sigma_px: float) -> int:
+    """Pixels on each side of the nearest one that a spot reaches."""
+    return math.ceil(SPOT_SIGMAS * sigma_px) + 1
+
+
 def spots(pixels: Numbers, electrons: Numbers, sigma_px: float, shape: tuple[int, int]) -> Light:
     """Sum of spots (rows, columns) at ``pixels`` (n, 2), x first; skips NaN.
 
@@ -38,7 +43,7 @@ def spots(pixels: Numbers, electrons: Numbers, sigma_px: float, shape: tuple[int
         sigma_px: their standard deviation, above 0.
         shape: rows and columns.
     """
-    half = math.ceil(SPOT_SIGMAS * sigma_px) + 1
+    half = reach_px(sigma_px)
     rows, columns = shape
     with np.errstate(invalid="ignore"):
         near = np.all((pixels > -half) & (pixels < (columns - 1 + half, rows - 1 + half)), axis=1)

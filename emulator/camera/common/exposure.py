@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from cubestack.emulator.camera.common.glow import glow_electrons
 from cubestack.emulator.camera.common.optics import Optics
 from cubestack.emulator.camera.common.shutter import RollingShutter
-from cubestack.emulator.light.spots import spots
+from cubestack.emulator.light.spots import reach_px, spots
 from cubestack.emulator.scene.attitude import matrix_from_quaternion
 from cubestack.emulator.scene.hazards.contract import CameraState, Vectors
 from cubestack.emulator.scene.hipparcos import load_sky
@@ -197,13 +197,18 @@ def _instant(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Pixels (n, 2) of stars at the instant ``phase`` of their own rows, and weights (n,).
 
-    A star that moves down with the read-out is exposed by more rows, each for the full time.
+    A star that moves down with the read-out is exposed by more rows, each for the full time. Stars
+    that do not move become NaN where their spots are beyond the sensor.
     """
     now = _time_ps(optics, shutter, phase)
     in_camera = vectors @ matrix_from_quaternion(scene.truth(now)).T
-    pixels, weights = optics.project(in_camera), optics.transmission(in_camera)
     if not scene.speed_deg_s:
+        near = optics.may_meet(in_camera, reach_px(optics.psf_sigma_px))
+        pixels, weights = np.full((len(vectors), 2), np.nan), np.zeros(len(vectors))
+        pixels[near] = optics.project(in_camera[near])
+        weights[near] = optics.transmission(in_camera[near])
         return pixels, weights
+    pixels, weights = optics.project(in_camera), optics.transmission(in_camera)
     # The present pose, even if the next one begins in between, for its velocity.
     later = scene.pose_at(now).at(now / PS_PER_S + VELOCITY_STEP_S)
     moved = optics.project(vectors @ matrix_from_quaternion(later).T)

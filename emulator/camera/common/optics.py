@@ -136,6 +136,15 @@ class Optics(DeclaredValues):
         pixels[imaged] = displace(distorted * self._scale + (self.cx, self.cy), self.residuals)
         return pixels
 
+    def may_meet(self, vectors: NDArray[np.float64], margin_px: float) -> NDArray[np.bool_]:
+        """Whether directions (n, 3) in camera axes can be within ``margin_px`` of the sensor.
+
+        Much faster than ``project``, and false for nearly all others.
+        """
+        x, y, z = vectors.T
+        across, down = self._edge_tangents + 2 * margin_px / self._focal_px  # twice: distortion
+        return np.asarray((z > 0) & (np.abs(x) < across * z) & (np.abs(y) < down * z))
+
     def unproject(self, pixels: Pixels) -> NDArray[np.float64]:
         """Unit vectors (n, 3) in camera axes of pixel coordinates (n, 2)."""
         points = restore(np.asarray(pixels, np.float64), self.residuals)
@@ -199,6 +208,16 @@ class Optics(DeclaredValues):
         """Tangent of the field angle beyond which nothing is projected."""
         corners = self.unproject(self._corners)
         return 1.1 * float((np.hypot(corners[:, 0], corners[:, 1]) / corners[:, 2]).max())
+
+    @cached_property
+    def _edge_tangents(self) -> NDArray[np.float64]:
+        """Largest tangents (2,) of directions on the sensor's edge, across and down."""
+        share = np.linspace(0, 1, 65)
+        zero, one = np.zeros_like(share), np.ones_like(share)
+        sides = [(share, zero), (share, one), (zero, share), (one, share)]
+        edge = np.concatenate([np.stack(side, axis=1) for side in sides])
+        vectors = self.unproject(edge * (self.columns, self.rows) - 0.5)
+        return np.asarray(np.abs(vectors[:, :2] / vectors[:, 2:]).max(axis=0))
 
     def _polynomial(self, points: Pixels, sign: int) -> Pixels:
         """Equations 4.1.3 and 4.1.4 on normalised points, the coefficients times ``sign``."""

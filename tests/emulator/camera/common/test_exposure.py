@@ -44,6 +44,18 @@ def light(scene: SkyScene, shutter: RollingShutter = LONG, lens: Optics = LENS) 
     return star_light(scene, lens, shutter)
 
 
+@pytest.mark.parametrize(
+    "lens", [LENS, double_gauss(), double_gauss(40.0, shade=False), replace(LENS, psf_sigma_px=9.0)]
+)
+def test_stars_that_are_not_projected_cast_no_light(
+    lens: Optics, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    skies = [SkyScene(one) for one in np.random.default_rng(5).standard_normal((2, 4))]
+    found = [light(sky, LONG, lens) for sky in skies]
+    monkeypatch.setattr(Optics, "may_meet", lambda _self, vectors, _px: np.ones(len(vectors), bool))
+    np.testing.assert_array_equal([light(sky, LONG, lens) for sky in skies], found)
+
+
 def star(hip: int) -> np.ndarray:
     return SKY.vectors[np.searchsorted(SKY.hip, hip)].copy()
 
