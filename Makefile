@@ -21,18 +21,22 @@ PYTEST := PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 $(BIN)/pytest
 SEED ?= 0
 SIMULATOR ?= icarus
 
+# How long `make fuzz` goes on; what fails is kept in out/fuzz.
+MINUTES ?= 10
+
 # What `make pasted` pastes; all when it is empty.
 DOCUMENTS ?=
 
 # Nothing here is made by a built-in rule: one would make "setup" of setup.sh.
 MAKEFLAGS += --no-builtin-rules
 
-.PHONY: help venv run docs test test-all test-hdl test-clients test-suites pasted firmware mutants lint wheels bench bench-engines clean
+.PHONY: help venv run docs test fuzz test-all test-hdl test-clients test-suites pasted firmware mutants lint wheels bench bench-engines clean
 
 help:
 	@echo "make run       set up, then boot the sensors, measure over their serial ports, and draw what they saw"
 	@echo "make test      set up, then run the tests, but for those that take long"
 	@echo "make test-all  set up, then run all tests"
+	@echo "make fuzz      set up, then feed all readers of files and messages with documents that are nearly right"
 	@echo "make test-hdl  set up, then simulate the gateware: more than make test does, with coverage"
 	@echo "make test-clients  set up, install programs of others, then run them on the emulated ports"
 	@echo "make test-suites  set up, install test suites of others, then run them on the simulator; EVERY=20 runs a part"
@@ -68,6 +72,9 @@ test: .venv/ready-dev
 
 test-all: .venv/ready-board
 	@$(PYTEST) $(TESTS) -m "slow or not slow"
+
+fuzz: .venv/ready-dev
+	@$(BIN)/python -m tests.fuzz.run --minutes $(MINUTES)
 
 pasted:
 	@$(PYTHON) -m tests.system.documents.pasted $(DOCUMENTS)

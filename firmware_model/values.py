@@ -347,11 +347,12 @@ def read_table(given: Mapping[str, Any], keys: Keys) -> dict[str, Any]:
     """The checked values of a table; ValueError for an unknown, wrong or missing key."""
     values: dict[str, Any] = {}
     keys = _named(keys)
-    now = {one.formerly: name for name, one in keys.items()}
+    now = {one.formerly: name for name, one in keys.items() if one.formerly}
     for word, value in given.items():
         name = now.get(word, word)
         if name not in keys:
-            raise ValueError(f"unknown key {word!r}; allowed are {', '.join(keys)}")
+            key = f"{word!r:.{LONGEST_SHOWN}}"
+            raise ValueError(f"unknown key {key}; allowed are {', '.join(keys)}")
         if name in values:
             raise ValueError(f"{name} is given twice, once as {keys[name].formerly}")
         if name != word:

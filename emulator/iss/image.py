@@ -8,7 +8,10 @@ from pathlib import Path
 from cubestack.emulator.iss import image_formats
 from cubestack.emulator.iss.file_kind import kind_of_file
 from cubestack.emulator.iss.image_formats import FormatError
-from cubestack.firmware_model.formats.untrusted import LARGEST_IMAGE, read_bytes
+from cubestack.firmware_model.formats.untrusted import LARGEST_IMAGE, read_bytes, shown
+
+LONGEST_REASON = 300
+"""Characters of an error that may quote the file."""
 
 VECTORS = 8
 """Bytes of the vector table that are checked: stack pointer and reset vector."""
@@ -105,7 +108,7 @@ def load_image(name: str | Path, memory: Memory | None = None, base: int | None 
             segments = read(data)
         except FormatError as error:
             between = ", " if str(error).startswith(("line", "block")) else " "
-            raise ImageError(f"{path}{between}{error}") from None
+            raise ImageError(f"{path}{between}{shown(str(error))[:LONGEST_REASON]}") from None
         image = Image(segments, path, data if read is image_formats.elf_segments else None)
     check_image(image, memory)
     if not image.hash.startswith(wanted):

@@ -50,7 +50,7 @@ def read_scene_file(
         kind = table.pop("kind", None)
         table = {key: value for key, value in table.items() if key not in DEVICE_KEYS}
         if not isinstance(kind, str) or kind not in kinds:
-            raise SceneError(f"kind must be {right}, not {kind!r}")
+            raise SceneError(f"kind must be {right}, not {kind!r:.80}")
         return kinds[kind](table)
 
     return read_file(path, scene)

@@ -13,6 +13,10 @@ WIDEST = 32
 """Bits of the widest channel whose level is read; no pin table has a wider pin."""
 
 
+LATEST_PS = 1 << 62
+"""Latest time of a change."""
+
+
 class CaptureError(ValueError):
     """A file that is no capture, or does not fit the device: one line."""
 

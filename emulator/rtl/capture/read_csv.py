@@ -16,7 +16,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.emulator.rtl.capture.capture import Capture, CaptureError, Channel, rate_period_ps
+from cubestack.emulator.rtl.capture.capture import (
+    LATEST_PS,
+    Capture,
+    CaptureError,
+    Channel,
+    rate_period_ps,
+)
 from cubestack.firmware_model.formats.untrusted import LARGEST_FILE, opened
 
 _UNITS_PS = {
@@ -149,7 +155,11 @@ def _times(
             f"{path} gives no unit of its times; label the column 'Time [ns]', or add a line"
             " '; Samplerate: 24 MHz'"
         )
-    return np.round(steps * unit).astype(np.int64), period_ps
+    with np.errstate(over="ignore"):
+        times = np.round(steps * unit)
+    if times.max(initial=0.0) > LATEST_PS:
+        raise CaptureError(f"{path} is damaged: its times end after {LATEST_PS} ps")
+    return times.astype(np.int64), period_ps
 
 
 def _is_number(text: str) -> bool:

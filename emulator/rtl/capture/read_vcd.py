@@ -11,6 +11,7 @@ from typing import IO
 import numpy as np
 
 from cubestack.emulator.rtl.capture.capture import (
+    LATEST_PS,
     UNKNOWN,
     WIDEST,
     Capture,
@@ -147,13 +148,13 @@ class _Reader:
         number = text.rstrip("smunpf")
         unit = _UNITS_PS.get(text[len(number) :])
         if number not in ("1", "10", "100") or unit is None:
-            raise CaptureError(f"{self._path} has the timescale {text!r}; an example is 1ns")
+            raise CaptureError(f"{self._path} has the timescale {text!r:.80}; an example is 1ns")
         return int(number) * unit
 
     def _declare(self, parts: list[str], scopes: list[str]) -> None:
         if len(parts) < 4 or not parts[1].isdecimal() or not 1 <= int(parts[1]) < 1 << 20:
-            text = " ".join(parts)
-            raise CaptureError(f"{self._path} has '$var {text}'; an example is $var wire 1 ! ACK")
+            text = f"$var {' '.join(parts)}"
+            raise CaptureError(f"{self._path} has {text!r:.80}; an example is $var wire 1 ! ACK")
         kind, width, code, *name = parts
         self._numbers.setdefault(code.encode(), ())
         if kind in _NO_LEVEL:
@@ -164,8 +165,11 @@ class _Reader:
 
     def _time(self, word: bytes) -> int:
         try:
-            return int(word[1:])
-        except ValueError:
+            time = int(word[1:])
+            if abs(time) * max(1.0, self._unit_ps or 0.0) > LATEST_PS:
+                raise ValueError
+            return time
+        except (ValueError, OverflowError):
             raise CaptureError(f"{self._path} is damaged: {_shown(word)} is no time") from None
 
     def _level(self, word: bytes, now: int) -> int:
