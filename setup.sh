@@ -61,7 +61,15 @@ fi
 [ -x .venv/bin/python ] || { say "making .venv"; "$PYTHON" -m venv .venv; }
 say "installing Python packages"
 log=.venv/pip.log
-if ! .venv/bin/python -m pip install --disable-pip-version-check -e ".${extras:+[$extras]}" >"$log" 2>&1; then
+# Exactly the versions that were tested, each with its hash; for the Python that they were chosen with.
+locked() {
+    [ "$kind" = dev ] || fail "LOCKED=1 is for make test"
+    "$PYTHON" -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' || fail "LOCKED=1 needs Python 3.11"
+    install --require-hashes --no-deps -r requirements-dev.txt && install --no-deps --no-build-isolation -e .
+}
+install() { .venv/bin/python -m pip install --disable-pip-version-check "$@" >>"$log" 2>&1; }
+: >"$log"
+if ! { [ -n "${LOCKED:-}" ] && locked || { [ -z "${LOCKED:-}" ] && install -e ".${extras:+[$extras]}"; }; }; then
     tail -n 5 "$log" >&2
     fail "pip failed; the whole log is in $log"
 fi

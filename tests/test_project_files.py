@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 import yaml
+from packaging.requirements import Requirement
 
 from cubestack.host.native.wheels import PLATFORMS
 
@@ -107,3 +108,51 @@ def test_no_page_installs_from_an_index() -> None:
     texts = [*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("examples/**/*.md")]
     texts += [path for name in ("emulator", "hdl", "host") for path in ROOT.glob(f"{name}/**/*.py")]
     assert not [path for path in texts if by_name.search(path.read_text("utf-8"))]
+
+
+def locked() -> dict[str, tuple[str, list[str]]]:
+    """Version and hashes by package of the development environment's lock file."""
+    text = text_of("requirements-dev.txt").replace("\\\n", " ")
+    lines = [line.split() for line in text.splitlines() if line and not line.startswith("#")]
+    return {
+        words[0].partition("==")[0]: (words[0].partition("==")[2], words[1:]) for words in lines
+    }
+
+
+def required(extra: str) -> Iterator[Requirement]:
+    names = project()["dependencies"] if not extra else project()["optional-dependencies"][extra]
+    for requirement in map(Requirement, names):
+        if requirement.name == "cubestack":
+            for more in requirement.extras:
+                yield from required(more)
+        else:
+            yield requirement
+
+
+def test_lock_file_has_all_that_make_test_needs_with_hashes() -> None:
+    found = locked()
+    for requirement in (*required(""), *required("dev"), *required("hdl")):
+        assert requirement.name in found, f"{requirement.name} is not locked: see CONTRIBUTING.md"
+        assert requirement.specifier.contains(found[requirement.name][0]), requirement
+    for name, (version, hashes) in found.items():
+        assert version, name
+        assert hashes, name
+        assert all(re.fullmatch(r"--hash=sha256:[0-9a-f]{64}", one) for one in hashes), name
+
+
+def test_lock_file_names_no_place() -> None:
+    assert not re.search(r"https?://|index-url|@", text_of("requirements-dev.txt"))
+
+
+def test_promises_of_security_name_existing_tests() -> None:
+    rows = [line for line in text_of("SECURITY.md").splitlines() if line.startswith("|")][2:]
+    for row in rows:
+        paths = re.findall(r"`(tests/[\w/.]+)`", row)
+        assert paths, row
+        assert all((ROOT / path).exists() for path in paths), row
+
+
+def test_compiler_that_makes_loaded_code_is_pinned() -> None:
+    (zig,) = (one for one in required("compiler") if one.name == "ziglang")
+    assert str(zig.specifier).startswith("==")
+    assert [one for one in required("release") if one.name == "ziglang"] == [zig]
