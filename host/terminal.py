@@ -63,7 +63,7 @@ def tell(text: str) -> None:
 def head(title: str) -> None:
     """Print a title: with a rule if the terminal is wide enough, else plain."""
     if console.is_terminal and len(title) + 4 <= console.width:
-        console.rule(Text(title))
+        console.rule(Text(shown_lines(title)))
     else:
         tell(f"== {title} ==")
 
@@ -73,11 +73,13 @@ def show(table: Table) -> None:
 
     Plain is a line for each row, its cells in columns, and the title above.
     """
+    table.title = None if table.title is None else _visible(table.title)  # type: ignore[assignment]
+    for column in table.columns:
+        column.header = _visible(column.header)
+        column._cells = [_visible(cell) for cell in column._cells]
     options = console.options.update(max_width=_WIDEST)
     width = Measurement.get(console, options, table).maximum
     if console.is_terminal and width <= console.width:
-        for column in table.columns:
-            column._cells = [_visible(cell) for cell in column._cells]
         console.print(table)
         return
     if table.title is not None:
@@ -93,7 +95,7 @@ def show(table: Table) -> None:
 
 
 def _on_one_line(cell: RenderableType) -> RenderableType:
-    return _visible(cell.replace("\n", "  ") if isinstance(cell, str) else cell)
+    return cell.replace("\n", "  ") if isinstance(cell, str) else cell
 
 
 def _visible(cell: RenderableType) -> RenderableType:

@@ -208,3 +208,22 @@ def test_error_removes_the_display(screen: StringIO) -> None:
 def test_quiet_progress_has_no_bar(screen: StringIO) -> None:
     assert list(terminal.progress(range(3), 3, "measuring", quiet=True)) == [0, 1, 2]
     assert screen.getvalue() == ""
+
+
+@pytest.mark.parametrize("terminal_or_pipe", [True, False])
+def test_escape_sequences_are_shown(
+    terminal_or_pipe: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = StringIO()
+    console = Console(file=out, force_terminal=terminal_or_pipe, no_color=True, width=200)
+    monkeypatch.setattr(terminal, "console", console)
+    monkeypatch.setattr(terminal, "_errors", console)
+    table = Table("a\x1b]0;x\x07", title="t\x1b[2J")
+    table.add_row("b\x1b[31m")
+    for show in (terminal.say, terminal.tell, terminal.head):
+        show("c\x1b[31m\r\x9b")
+    terminal.show(table)
+    for sequence in ("\x1b]", "\x1b[31m", "\x1b[2J", "\x07", "\r\x9b"):
+        assert sequence not in out.getvalue()
+    assert r"c\x1b[31m\r\x9b" in out.getvalue()
+    assert r"b\x1b[31m" in out.getvalue()
