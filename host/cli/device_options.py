@@ -79,13 +79,14 @@ def add_board_arguments(
             common = option.name in {one.name for one in GATEWARE_OPTIONS}
             if not common and (serving or not option.serves):
                 found.setdefault(option.name, (option, []))[1].append(device.name)
+    group = parser.add_argument_group("device, its firmware and its FPGA")
     for option, owners in found.values():
-        add_option(parser, option, f"{', '.join(owners)}: ")
+        add_option(group, option, f"{', '.join(owners)}: ")
     for option in (*GATEWARE_OPTIONS, *PROFILE_OPTIONS):
-        add_option(parser, option)
+        add_option(group, option)
 
 
-def add_option(parser: argparse.ArgumentParser, option: BoardOption, prefix: str = "") -> None:
+def add_option(parser: argparse._ActionsContainer, option: BoardOption, prefix: str = "") -> None:
     """Declare one of them; ``prefix`` goes before its help."""
     how = {"action": _Joined} if option.repeats else {}
     add_value(parser, option.name, option, default=None, help=prefix + option.meaning, **how)
@@ -151,11 +152,10 @@ def inject_plan(
 
 
 def add_record_arguments(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("records")
+    add_path(group, "--record", "record every byte of all ports to FILE (docs/how-to/recording.md)")
     add_path(
-        parser, "--record", "record every byte of all ports to FILE (docs/how-to/recording.md)"
-    )
-    add_path(
-        parser,
+        group,
         "--trace",
         "write serial lines, buses, FPGA pins and firmware variables as a waveform",
         "FILE.vcd",
@@ -163,8 +163,9 @@ def add_record_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_insight_arguments(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("insight into own firmware")
     add_value(
-        parser,
+        group,
         "gdb",
         whole(
             None,
@@ -174,9 +175,9 @@ def add_insight_arguments(parser: argparse.ArgumentParser) -> None:
             metavar="PORT",
         ),
     )
-    add_flag(parser, "--gdb-wait", "with --gdb: wait for gdb before the first instruction")
-    add_path(parser, "--profile-out", "cycles by function and line of --firmware, for kcachegrind")
-    add_path(parser, "--coverage-out", "executed lines of --firmware, as an lcov file")
+    add_flag(group, "--gdb-wait", "with --gdb: wait for gdb before the first instruction")
+    add_path(group, "--profile-out", "cycles by function and line of --firmware, for kcachegrind")
+    add_path(group, "--coverage-out", "executed lines of --firmware, as an lcov file")
 
 
 def insight(

@@ -62,8 +62,6 @@ def run(args: argparse.Namespace) -> int:
     from cubestack.host.ground.serving import LOOPBACK, Serving
 
     ended = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda _number, _frame: ended.set())
     options = _options(args)
     _check(args.targets, args.device, options, args.record)
     with ExitStack() as stack:
@@ -77,6 +75,8 @@ def run(args: argparse.Namespace) -> int:
         print(f'{{"page": "{address}"}}' if args.json else f"the page: {address}", flush=True)
         for session in sessions:
             session.result()  # whatever does not open ends this
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, lambda _number, _frame: ended.set())
         say("Ctrl-C ends it")
         while not ended.wait(LOOK_S):  # a signal that comes just before a wait does not end it
             pass

@@ -24,7 +24,8 @@ LAST_PORT = 65535
 
 def add_port_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options; a line has one end, so they exclude each other."""
-    where = parser.add_mutually_exclusive_group()
+    ports = parser.add_argument_group("ports")
+    where = ports.add_mutually_exclusive_group()
     add_path(
         where,
         "--pty",
@@ -47,21 +48,19 @@ def add_port_arguments(parser: argparse.ArgumentParser) -> None:
         ),
     )
     add_flag(
-        parser,
+        ports,
         "--strict-line",
         "pseudo-terminals have the baud rate, parity and stop bits that clients set, as "
         "with --rfc2217; without it a mismatch is only reported",
     )
-    parser.add_argument(
+    ports.add_argument(
         "--listen",
         default=LOOPBACK,
         metavar="ADDRESS",
         help=f"of the TCP port (default {LOOPBACK}); any other needs --allow-remote",
     )
     add_flag(
-        parser,
-        "--allow-remote",
-        "accept connections from other machines; nothing protects the port",
+        ports, "--allow-remote", "accept connections from other machines; nothing protects the port"
     )
 
 

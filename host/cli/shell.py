@@ -74,8 +74,8 @@ def _lines(args: argparse.Namespace) -> list[str] | None:
         return None
     try:
         return list(read_text(args.script).splitlines())
-    except (OSError, UnicodeDecodeError) as error:
-        raise ValueError(f"can not read script {args.script}: {error}") from None
+    except OSError as error:
+        raise ValueError(f"can not read script {args.script}: {error.strerror}") from None
 
 
 def split_commands(text: str) -> Iterator[str]:

@@ -88,3 +88,18 @@ def test_completion_script_is_valid_for_its_shell(shell: str, run: Run, tmp_path
     if shutil.which(shell) is not None:
         (tmp_path / "script").write_text(printed.out)
         subprocess.run([shell, "-n", str(tmp_path / "script")], check=True, timeout=20)
+
+
+def test_help_of_a_command_with_many_options_is_in_groups(run: Run) -> None:
+    shown = run("emulate", "--help").out
+    titles = re.findall(r"^([a-z][a-zA-Z ,]+):$", shown, re.M)
+    assert [title for title in titles if title != "examples"] == [
+        "positional arguments",
+        "options",
+        "ports",
+        "device, its firmware and its FPGA",
+        "records",
+        "insight into own firmware",
+    ]
+    listed = run("--help").out
+    assert re.findall(r"^  (\w+):$", listed, re.M) == ["Emulator", "Studies", "Tools"]

@@ -157,7 +157,7 @@ def make_files(folder: Path) -> None:
 
 
 ACCEPTED_S = 4.0
-ENDED_S = 10.0
+ENDED_S = 60.0
 PYTHON = re.compile(
     r"Traceback|Errno|codec|NoneType|invalid literal|could not convert|<class|object at|recursion"
     r"|list index|unpack|Error:|Exception|\bdict\b|expected str"
@@ -200,6 +200,8 @@ def _call(words: tuple[str, ...], folder: Path, errors: Path) -> int:
     except BaseException:
         traceback.print_exc()
         status = ESCAPED
+    if "multiprocessing.util" in sys.modules:
+        sys.modules["multiprocessing.util"]._exit_function()  # else its helper prints
     sys.stderr.flush()
     return status
 
