@@ -1,6 +1,6 @@
 """Draws the pictures of the pages about the ground page: `python -m docs.make_ground`.
 
-It starts the page for two emulated devices, has CubeStar capture an image, and takes screenshots
+It starts the page for two emulated devices, takes a picture with CubeStar, and takes screenshots
 in chromium. It needs the extra `ground`, playwright, and chromium on the PATH.
 """
 
@@ -18,8 +18,8 @@ from PIL import Image
 from playwright.sync_api import Page, sync_playwright
 
 IMAGES = Path(__file__).parent / "images"
-SEED, WIDTH, HEIGHT, COLOURS = "5", 1280, 1500, 256
-WAIT_MS, SETTLED_MS = 120_000, 3000
+SEED, WIDTH, HEIGHT, COLOURS = "5", 1280, 900, 256
+WAIT_MS = 120_000
 
 
 @contextmanager
@@ -34,27 +34,21 @@ def station() -> Iterator[str]:
             process.send_signal(signal.SIGINT)
 
 
-def save(png: bytes, name: str) -> None:
-    """Write a screenshot with few colours, as a small file."""
-    image = Image.open(BytesIO(png)).convert("RGB")
-    image.quantize(COLOURS, dither=Image.Dither.NONE).save(IMAGES / name, optimize=True)
-    print(IMAGES / name)
-
-
-def draw(page: Page) -> None:
-    """Capture an image, and take both screenshots."""
+def drawn(page: Page) -> Iterator[tuple[str, Image.Image]]:
+    """Take a picture, then yield both screenshots with their names, in few colours."""
     page.set_default_timeout(WAIT_MS)
     page.click("nav >> text=CubeStar")
-    page.wait_for_selector("#scene-status >> text=/camera/")
-    page.fill("#line", "write CaptureAndProcess")
-    page.press("#line", "Enter")
-    page.wait_for_selector("#timeline >> text=/CALCULATED/")
-    page.check("#detections")
+    page.click("#take")
     page.wait_for_selector("#picture >> text=/ detected, /")
-    page.wait_for_timeout(SETTLED_MS)
-    page.evaluate("window.scrollTo(0, 0)")
-    save(page.screenshot(), "ground.png")
-    save(page.locator("#scene").screenshot(), "ground-scene.png")
+    yield "ground.png", _small(page.screenshot())
+    page.click("#tab-scene")
+    page.wait_for_selector("#scene-status >> text=/camera/")
+    page.mouse.move(0, 0)
+    yield "ground-scene.png", _small(page.locator("#scene").screenshot())
+
+
+def _small(png: bytes) -> Image.Image:
+    return Image.open(BytesIO(png)).convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE)
 
 
 def main() -> None:
@@ -64,7 +58,9 @@ def main() -> None:
         browser = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
         page = browser.new_page(viewport={"width": WIDTH, "height": HEIGHT})
         page.goto(address)
-        draw(page)
+        for name, image in drawn(page):
+            image.save(IMAGES / name, optimize=True)
+            print(IMAGES / name)
         browser.close()
 
 

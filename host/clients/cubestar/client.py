@@ -31,6 +31,9 @@ from cubestack.host.clients.quaternions import (
 )
 from cubestack.host.errors import BadAnswerError, StepFailedError
 
+#: The tasks from this one on are about an image.
+_FIRST_OF_IMAGE = TaskStatus.RECEIVING_IMAGE
+
 
 @dataclass(frozen=True)
 class Attitude:
@@ -230,9 +233,10 @@ class CubeStar(DeviceClient):
 
     def summary(self, latest: Columns) -> str:
         """Stars of the latest image, and its attitude or why there is none."""
-        if not latest["frame"]:
-            return "no image since power-up"
         detected = int(self.client.telemetry("DetectionSummary")["NumStarsDetected"])
+        begun = latest["frame"] or detected or TaskStatus[str(latest["task"])] >= _FIRST_OF_IMAGE
+        if not begun:
+            return "no image since power-up"
         quality = self.quality()
         if latest["valid"]:
             identified = int(self.client.telemetry("NumIdStars")["numIdStars"])

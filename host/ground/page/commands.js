@@ -1,6 +1,7 @@
 // Forms for telecommands, generated from the device's tables, and the shell with saved commands.
 
 import { button, choose, disabledIf, labelled, make, note, row } from "./dom.js";
+import { confirmed } from "./confirm.js";
 
 const HISTORY = 30;
 const MOST = 40; // saved commands
@@ -12,7 +13,12 @@ export class Commands {
     this.execute = execute;
     const supported = about.telecommands.filter((one) => one.supported);
     this.byName = new Map(supported.map((one) => [one.name, one]));
-    this.name = choose([...this.byName.keys()], { id: "command", onchange: () => this.show() });
+    this.name = make("select", { id: "command", onchange: () => this.show() });
+    const groups = { "safe": (one) => !one.risk, "asks first": (one) => one.risk };
+    for (const [label, belongs] of Object.entries(groups)) {
+      const names = supported.filter(belongs).map((one) => make("option", { textContent: one.name }));
+      if (names.length) this.name.append(make("optgroup", { label }, ...names));
+    }
     this.meaning = note();
     this.fields = make("form", { onsubmit: (event) => this.send(event) });
     this.line = make("input", {
@@ -40,19 +46,27 @@ export class Commands {
   show() {
     const one = this.byName.get(this.name.value);
     if (!one) return;
-    this.meaning.textContent = `${one.id}: ${one.meaning}`;
+    const risk = one.risk ? ` (${one.risk})` : "";
+    this.meaning.textContent = `${one.id}: ${one.meaning}${risk}`;
     const inputs = one.fields.map((field) => labelled(field.name, input(field)));
     const state = disabledIf(this.about.missing.send);
-    const send = make("button", { className: "main", id: "send", textContent: "Send", ...state });
+    const send = make("button", {
+      className: one.risk ? "risk" : "main",
+      id: "send",
+      textContent: one.risk ? "Send …" : "Send",
+      ...state,
+    });
     this.fields.replaceChildren(...inputs, send);
   }
 
-  send(event) {
+  async send(event) {
     event.preventDefault();
+    const { name, risk } = this.byName.get(this.name.value);
+    if (risk && !(await confirmed(`Send ${name}`, `${risk[0].toUpperCase()}${risk.slice(1)}.`))) return;
     const values = [...this.fields.elements]
       .filter((element) => element.name)
       .map((element) => `${element.name}='${element.value.replaceAll("'", "")}'`);
-    this.run(["write", this.name.value, ...values].join(" "));
+    this.run(["write", name, ...values].join(" "));
   }
 
   submit(event) {

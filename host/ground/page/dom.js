@@ -44,6 +44,14 @@ export function button(textContent, id, onclick, why = null) {
   return make("button", { textContent, ...(id && { id }), type: "button", onclick, ...disabledIf(why) });
 }
 
+// Disables all controls in an element, with the reason.
+export function disable(place, why) {
+  for (const one of place.querySelectorAll("button, input, select, textarea")) {
+    one.disabled = true;
+    one.title = why;
+  }
+}
+
 // Calls `draw` once in the browser's next frame, however often it is requested before.
 export function atNextFrame(draw) {
   let requested = false;

@@ -2,13 +2,14 @@
 
 const RADIUS = 9; // all lengths in CSS pixels
 const EDGE = 4; // radius of marks that share a name, such as points of an edge
-const MANY = 3; // marks with the same name, which is not drawn then
+export const MANY = 3; // marks with the same name, which is not drawn then
 const TEXT = 12;
 const GAP = 3;
 
 const IDENTIFIED = "#78ff78";
 const UNIDENTIFIED = "#ff8c5a";
 const LINE = "#78aaff";
+const HALO = "#000c"; // keeps marks and names visible on a bright image
 
 export function line(pen, [fromX, fromY], [toX, toY]) {
   pen.beginPath();
@@ -52,27 +53,37 @@ export function drawDetections(pen, { marks, lines }, place, size, magnitudes) {
   pen.clearRect(0, 0, size.width, size.height);
   pen.font = `${TEXT}px system-ui, sans-serif`;
   pen.textBaseline = "middle";
-  pen.lineWidth = 1.5;
-  pen.strokeStyle = LINE;
+  pen.lineJoin = "round";
   pen.setLineDash([]);
   for (const line of lines) {
     pen.beginPath();
     for (const [x, y] of line) pen.lineTo(...place(x, y));
     pen.closePath();
-    pen.stroke();
+    haloed(pen, LINE);
   }
   const counts = new Map();
   for (const { name } of marks) counts.set(name, (counts.get(name) ?? 0) + 1);
   const isCommon = ({ name }) => name && counts.get(name) >= MANY;
   for (const mark of marks) {
     const { x, y, name } = mark;
-    pen.strokeStyle = name ? IDENTIFIED : UNIDENTIFIED;
     pen.setLineDash(name ? [] : [3, 3]);
-    ring(pen, place(x, y), isCommon(mark) ? EDGE : RADIUS);
+    const [column, row] = place(x, y);
+    pen.beginPath();
+    pen.arc(column, row, isCommon(mark) ? EDGE : RADIUS, 0, 2 * Math.PI);
+    haloed(pen, name ? IDENTIFIED : UNIDENTIFIED);
   }
   const named = marks.filter((mark) => mark.name && !isCommon(mark));
   const circles = marks.map((mark) => place(mark.x, mark.y));
   return drawNames(pen, named, circles, place, size, magnitudes);
+}
+
+function haloed(pen, colour) {
+  pen.lineWidth = 4;
+  pen.strokeStyle = HALO;
+  pen.stroke();
+  pen.lineWidth = 1.5;
+  pen.strokeStyle = colour;
+  pen.stroke();
 }
 
 function drawNames(pen, marks, circles, place, size, magnitudes) {
@@ -97,6 +108,10 @@ function drawNames(pen, marks, circles, place, size, magnitudes) {
       continue;
     }
     taken.push(box);
+    pen.setLineDash([]);
+    pen.lineWidth = 3;
+    pen.strokeStyle = HALO;
+    pen.strokeText(text, box.left, box.top + TEXT / 2);
     pen.fillText(text, box.left, box.top + TEXT / 2);
   }
   return hidden;

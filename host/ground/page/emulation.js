@@ -1,10 +1,10 @@
-// Controls of an emulation: virtual time, snapshots, faults and load switches.
+// Virtual time of an emulation, and its snapshots.
 
-import { button, choose, labelled, make, note, row } from "./dom.js";
+import { button, choose, disable, labelled, make, note, row } from "./dom.js";
 
 export class Emulation {
-  // `control(call, body)` sends a call about virtual time, `execute(line)` a line of the shell.
-  constructor(place, about, control, execute) {
+  // `control(call, body)` sends a call about virtual time.
+  constructor(place, about, control) {
     const why = about.missing.controls;
     this.time = make("output", { id: "time", className: "value" });
     this.state = note(why, { id: "state" });
@@ -36,38 +36,12 @@ export class Emulation {
       labelled("snapshot", this.snapshots),
       button("Go back to snapshot", "back", () => control("back", { to: this.snapshots.value })),
     );
-    this.fault = choose(about.faults, { id: "fault" });
-    this.parameters = make("input", { id: "parameters", size: 26, placeholder: "for_s=2" });
-    this.fault.onchange = () => {
-      const names = about.fault_parameters[this.fault.value.split(" ")[0]] ?? [];
-      this.parameters.title = names.length ? `${names.join("=, ")}=` : "";
-      this.parameters.placeholder = names.slice(0, 2).map((name) => `${name}=`).join(" ");
-    };
-    const faults = make(
-      "form",
-      {
-        onsubmit: (event) => {
-          event.preventDefault();
-          execute(`fault ${this.fault.value} ${this.parameters.value}`.trim());
-        },
-      },
-      labelled("fault", this.fault),
-      labelled("parameters", this.parameters),
-      make("button", { className: "main", id: "inject", textContent: "Inject fault" }),
-    );
-    const switches = about.channels.flatMap((channel) =>
-      ["on", "off"].map((to) =>
-        button(`${channel} ${to}`, `${channel}-${to}`, () => execute(`power ${channel} ${to}`)),
-      ),
-    );
     place.append(
       make("p", {}, "virtual time ", this.time),
       note(listed(about.chosen), { id: "chosen" }),
       this.state,
       time,
       history,
-      faults,
-      row(...switches),
     );
     if (why) disable(place, why);
     else if (about.missing.history) disable(history, about.missing.history);
@@ -101,11 +75,4 @@ export class Emulation {
 
 function listed(values, text = String) {
   return Object.entries(values).map(([name, value]) => `${name} ${text(value)}`).join(", ");
-}
-
-function disable(place, why) {
-  for (const one of place.querySelectorAll("button, input, select, textarea")) {
-    one.disabled = true;
-    one.title = why;
-  }
 }

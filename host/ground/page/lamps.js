@@ -1,53 +1,71 @@
-// Flags of telemetry and supplies as lamps, and statistics of the link.
+// Flags of telemetry and supplies, and statistics of the link.
 
 import { beside, make, note } from "./dom.js";
 
+const SIGNS = { fault: "■", notice: "▲", state: "●" };
+const LEGEND = { fault: "fault", notice: "notice", state: "state, no problem" };
+
 export class Lamps {
-  // `subscribe(names)` requests telemetry frames in every update.
-  constructor(place, about, subscribe) {
+  // `subscribe(names)` requests telemetry frames in every update, `show(set)` shows the flags that
+  // need attention.
+  constructor(place, about, subscribe, show) {
+    this.show = show;
     this.link = make("p", { id: "link-health" });
     this.supplies = make("ul", { className: "lamps", id: "supplies" });
     const none = about.missing.controls;
-    place.append(this.link, this.supplies);
-    if (none) place.append(note(`supplies: ${none}`));
     this.frames = about.telemetries
       .filter((one) => one.supported && !one.changes)
-      .map((one) => ({ name: one.name, flags: one.fields.filter((f) => f.type.startsWith("bool")) }))
+      .map((one) => ({ ...one, flags: one.fields.filter((field) => field.type.startsWith("bool")) }))
       .filter((one) => one.flags.length);
-    this.lamps = new Map();
     this.on = new Set();
-    for (const { name, flags } of this.frames) {
-      const list = make("ul", { className: "lamps", hidden: true });
-      for (const flag of flags) {
-        const lamp = make("li", { textContent: flag.name, title: flag.details });
-        this.lamps.set(`${name}.${flag.name}`, lamp);
-        list.append(lamp);
-      }
-      const read = make("input", {
-        type: "checkbox",
-        id: `lamps-${name}`,
-        onchange: () => {
-          this.on[read.checked ? "add" : "delete"](name);
-          list.hidden = !read.checked;
-          subscribe([...this.on]);
-        },
-      });
-      place.append(beside(name, read), list);
-    }
+    this.places = new Map();
+    const key = Object.entries(LEGEND).map(([kind, text]) =>
+      make("li", { className: kind, textContent: `${SIGNS[kind]} ${text}` }),
+    );
+    place.append(make("ul", { className: "legend flags", id: "flags-legend" }, ...key));
+    for (const frame of this.frames) this.addFrame(place, frame, subscribe);
     if (!this.frames.length) place.append(note(`${about.device} has no flags in telemetry`));
+    place.append(make("h3", { textContent: "Supplies" }), this.supplies);
+    if (none) place.append(note(`supplies: ${none}`));
+    place.append(make("h3", { textContent: "Link" }), this.link);
     document.getElementById(`lamps-${this.frames[0]?.name}`)?.click();
   }
 
+  addFrame(place, { name, meaning }, subscribe) {
+    const set = make("ul", { className: "flags", id: `set-${name}` });
+    const idle = make("ul", { className: "lamps" });
+    const summary = make("summary", { textContent: "not set" });
+    const shown = make("div", { hidden: true }, set, make("details", {}, summary, idle));
+    this.places.set(name, { set, idle, summary });
+    const read = make("input", {
+      type: "checkbox",
+      id: `lamps-${name}`,
+      onchange: () => {
+        this.on[read.checked ? "add" : "delete"](name);
+        shown.hidden = !read.checked;
+        subscribe([...this.on]);
+      },
+    });
+    const label = beside(name, read);
+    label.title = meaning;
+    place.append(label, shown);
+  }
+
   update(values) {
-    for (const name of this.on)
-      for (const { name: flag } of this.frames.find((one) => one.name === name).flags) {
-        const lamp = this.lamps.get(`${name}.${flag}`);
-        const value = values[name]?.[flag]; // undefined without an answer
-        const [kind, state] =
-          value === undefined ? ["unknown", "unknown"] : value ? ["lit", "on"] : ["", "off"];
-        lamp.className = kind;
-        lamp.setAttribute("aria-label", `${flag} ${state}`);
-      }
+    const urgent = new Map(); // by the flag's own name, which two frames may show
+    for (const frame of this.frames.filter(({ name }) => this.on.has(name))) {
+      const { set, idle, summary } = this.places.get(frame.name);
+      const now = values[frame.name] ?? {};
+      const isSet = (flag) => now[flag.name] === true || now[flag.name] === 1;
+      const known = frame.flags.filter((flag) => flag.name in now);
+      const raised = known.filter(isSet);
+      replace(set, raised, described);
+      replace(idle, frame.flags.filter((flag) => !isSet(flag)), (flag) => resting(flag, now));
+      summary.textContent = `${frame.flags.length - raised.length} not set${known.length ? "" : "; unknown"}`;
+      for (const flag of raised)
+        if (flag.severity !== "state") urgent.set(flag.flag || flag.name, flag);
+    }
+    this.show([...urgent.values()].sort((a, b) => a.severity.localeCompare(b.severity)).map(described));
   }
 
   updateLink({ sent, answered, late, repeated, refused, streamed, failed, broken, error }) {
@@ -55,7 +73,7 @@ export class Lamps {
     const images = streamed ? `, ${streamed} image frames` : "";
     const last = error ? `; last error: ${error}` : "";
     this.link.textContent =
-      `link: ${sent} requests, ${answered} answered, ${late} timed out, ` +
+      `${sent} requests, ${answered} answered, ${late} timed out, ` +
       `${repeated} retried, ${refused} refused${images}; ${failed} failed${last}`;
   }
 
@@ -68,4 +86,25 @@ export class Lamps {
     );
     this.supplies.replaceChildren(...lamps);
   }
+}
+
+// Rebuilds a list only if other flags stand in it, so that it can be read and selected.
+function replace(list, flags, element) {
+  const elements = flags.map(element);
+  const texts = elements.map((one) => one.textContent);
+  if (texts.join("\n") !== [...list.children].map((one) => one.textContent).join("\n"))
+    list.replaceChildren(...elements);
+}
+
+function described(flag) {
+  const sign = make("span", { className: "sign", textContent: SIGNS[flag.severity] });
+  sign.setAttribute("aria-label", LEGEND[flag.severity]);
+  const group = flag.group ? `${flag.group}: ` : "";
+  return make("li", { className: flag.severity }, sign, ` ${flag.name} `, make("span", { className: "quiet", textContent: `${group}${flag.meaning}` }));
+}
+
+function resting(flag, now) {
+  const unknown = !(flag.name in now);
+  const text = unknown ? `${flag.name} unknown` : flag.name;
+  return make("li", { className: unknown ? "unknown" : "", textContent: text, title: flag.details });
 }

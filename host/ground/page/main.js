@@ -4,9 +4,11 @@
 // requests, and `report(text, kind)`, which writes a line into the log.
 
 import { Attitude } from "./attitude.js";
+import { Answer } from "./answer.js";
 import { Commands, Favourites } from "./commands.js";
 import { make } from "./dom.js";
 import { Emulation } from "./emulation.js";
+import { Faults } from "./faults.js";
 import { Lamps } from "./lamps.js";
 import { Pictures } from "./picture.js";
 import { Playback, Transcript } from "./recording.js";
@@ -15,6 +17,7 @@ import { Scene } from "./scene/scene.js";
 import { ask, listen } from "./server.js";
 import { Settings } from "./settings.js";
 import { Start } from "./start.js";
+import { Tabs } from "./tabs.js";
 import { Telemetry } from "./telemetry.js";
 import { Timeline } from "./timeline.js";
 import { Transfer } from "./transfer.js";
@@ -22,40 +25,70 @@ import { Waveform } from "./waveform.js";
 
 const MOST_LINES = 500;
 
-const TITLES = {
-  playback: "Playback",
-  picture: "Image",
-  transfer: "Image transfer",
-  attitude: "Attitude",
-  commands: "Commands",
-  settings: "Settings and registers",
-  log: "Log",
-  transcript: "Recording",
-  results: "Results",
-  timeline: "Timeline",
-  health: "Health",
-  emulation: "Emulation",
-  start: "Profile and firmware",
-  scene: "Scene",
-  waveform: "Waveform",
-  telemetry: "Telemetry",
+// What an operator needs at once, then everything else, in tabs of one purpose each.
+const FIRST = { picture: "Image", answer: "Latest result", log: "Log", playback: "Playback" };
+const TABS = {
+  commands: ["Commands", { commands: "Commands", settings: "Settings and registers", transfer: "Image transfer" }],
+  telemetry: ["Telemetry", { telemetry: "Telemetry frames", health: "Flags, supplies, link" }],
+  results: ["Results", { attitude: "Attitude", results: "Results", timeline: "Timeline" }],
+  scene: ["Scene", { scene: "Scene" }],
+  faults: ["Faults", { faults: "Faults" }],
+  time: ["Time", { emulation: "Virtual time", start: "Profile and firmware" }],
+  record: ["Record", { transcript: "Recording", waveform: "Waveform" }],
 };
 
 const opened = Date.now();
-const lines = make("ol", { id: "lines", "aria-live": "polite" });
+const lines = make("ol", { id: "lines", tabIndex: 0, "aria-live": "polite", "aria-labelledby": "log-title" });
 const link = document.getElementById("link");
 let live = null;
 let targets = [];
-let selected = 0;
+let selected = -1;
+let frozen = false;
+const tabs = new Tabs(Object.fromEntries(Object.entries(TABS).map(([name, [title]]) => [name, title])), () => place());
 let reloading = false;
 
+function section(id, name) {
+  const title = make("h2", { id: `${id}-title`, textContent: name });
+  return make("section", { id, "aria-labelledby": title.id }, title);
+}
+
+function sections(titles) {
+  return Object.entries(titles).map(([id, name]) => section(id, name));
+}
+
 function addSections() {
-  for (const [id, textContent] of Object.entries(TITLES)) {
-    const title = make("h2", { id: `${id}-title`, textContent });
-    const attributes = { id, "aria-labelledby": title.id, hidden: id === "playback" };
-    document.querySelector("main").append(make("section", attributes, title));
-  }
+  const first = make("div", { id: "first" }, ...sections(FIRST));
+  for (const [name, [, titles]] of Object.entries(TABS)) tabs.panel(name).append(...sections(titles));
+  document.querySelector("main").append(first, tabs.list, tabs.panels);
   document.getElementById("log").append(lines);
+  document.getElementById("freeze").onclick = freeze;
+  document.addEventListener("keydown", shortcut);
+}
+
+// The address names the target and the tab: `#CubeStar/scene`.
+function follow() {
+  const [device, tab] = decodeURIComponent(location.hash.slice(1)).split("/");
+  tabs.show(tab);
+  const number = Math.max(targets.findIndex((about) => about.device === device), 0);
+  if (number !== selected) select(number);
+}
+
+function place() {
+  history.replaceState(null, "", `#${encodeURIComponent(targets[selected].device)}/${tabs.shown}`);
+}
+
+// Holds what the page shows; the device and its time go on.
+function freeze() {
+  frozen = !frozen;
+  const button = document.getElementById("freeze");
+  button.setAttribute("aria-pressed", String(frozen));
+  button.textContent = frozen ? "Resume display" : "Pause display";
+}
+
+function shortcut(event) {
+  const types = event.target.closest("input, select, textarea, dialog");
+  if (event.key === "p" && !types && !event.ctrlKey && !event.altKey && !event.metaKey)
+    document.getElementById("take").click();
 }
 
 function report(text, kind = "") {
@@ -86,9 +119,10 @@ function select(number) {
   selected = number;
   const about = targets[number];
   document.title = `${about.device} – cubestack`;
-  for (const section of document.querySelectorAll("main > section:not(#log)"))
+  place();
+  for (const section of document.querySelectorAll("section:not(#log)"))
     section.replaceChildren(section.querySelector("h2"));
-  const place = (part) => document.getElementById(part);
+  const at = (part) => document.getElementById(part);
   const path = `/targets/${number}`;
   const execute = (line) => reported(line, ask(`${path}/shell`, { line }));
   const control = (call, body) => reported(call, ask(`${path}/${call}`, body));
@@ -103,22 +137,24 @@ function select(number) {
     subscribe({ show: [...new Set(Object.values(frames).flat())] });
   };
   live = null; // the parts' subscriptions are sent together, once it is open
-  const commands = new Commands(place("commands"), about, execute);
-  new Favourites(place("commands"), about, commands);
-  new Settings(place("settings"), about, path, report);
-  new Transcript(place("transcript"), about, path, report);
-  const playback = new Playback(place("playback"), about, path, report);
-  const waveform = new Waveform(place("waveform"), about, path, report);
-  const emulation = new Emulation(place("emulation"), about, control, execute);
-  new Start(place("start"), about, path, reported);
-  new Scene(place("scene"), about, path, reported);
-  const pictures = new Pictures(place("picture"), about, path, (every_s) => subscribe({ every_s }));
-  const transfer = new Transfer(place("transfer"), path, about, report);
-  const attitude = new Attitude(place("attitude"), about);
-  const timeline = new Timeline(place("timeline"), about, (names) => show("timeline", names));
-  const lamps = new Lamps(place("health"), about, (names) => show("lamps", names));
-  const results = new Results(place("results"), about, path, report, (on) => subscribe({ results: on }));
-  const telemetry = new Telemetry(place("telemetry"), about, (names) => show("telemetry", names));
+  const commands = new Commands(at("commands"), about, execute);
+  new Favourites(at("commands"), about, commands);
+  new Settings(at("settings"), about, path, report);
+  new Transcript(at("transcript"), about, path, report);
+  const playback = new Playback(at("playback"), about, path, report);
+  const waveform = new Waveform(at("waveform"), about, path, report);
+  const emulation = new Emulation(at("emulation"), about, control);
+  new Faults(at("faults"), about, execute);
+  new Start(at("start"), about, path, reported);
+  new Scene(at("scene"), about, path, reported);
+  const pictures = new Pictures(at("picture"), about, path, (every_s) => subscribe({ every_s }), reported);
+  const answer = new Answer(at("answer"), about);
+  const transfer = new Transfer(at("transfer"), path, about, report);
+  const attitude = new Attitude(at("attitude"), about);
+  const timeline = new Timeline(at("timeline"), about, (names) => show("timeline", names));
+  const lamps = new Lamps(at("health"), about, (names) => show("lamps", names), (set) => answer.showFlags(set));
+  const results = new Results(at("results"), about, path, report, (on) => subscribe({ results: on }));
+  const telemetry = new Telemetry(at("telemetry"), about, (names) => show("telemetry", names));
   live = listen(
     `${path}/live`,
     (message) => {
@@ -126,8 +162,10 @@ function select(number) {
         reload();
         return;
       }
-      link.className = message.link.broken ? "bad" : "";
-      link.textContent = about.name;
+      const { broken, error } = message.link;
+      link.className = broken ? "bad" : "good";
+      link.textContent = `${about.name}: ${broken ? error : "answers"}`;
+      if (frozen) return;
       lamps.updateLink(message.link);
       transfer.update(message.transfer);
       playback.update(message.playback);
@@ -137,6 +175,7 @@ function select(number) {
         lamps.update(message.values);
       }
       if (message.results) {
+        answer.update(message.results, truth, message.summary);
         results.update(message.results, truth, message.results_logged);
         attitude.update(message.results, truth);
       }
@@ -145,6 +184,7 @@ function select(number) {
       if (message.pictures) pictures.update(message.pictures, message.emulation.busy);
       if (message.emulation) {
         emulation.update(message.emulation);
+        pictures.updateTime(message.emulation);
         waveform.update(message.emulation);
         lamps.updateSupplies(message.emulation);
       }
@@ -183,7 +223,8 @@ async function start() {
     make("button", { textContent: about.device, onclick: () => select(number) }),
   );
   document.getElementById("targets").replaceChildren(...buttons);
-  select(0);
+  window.addEventListener("hashchange", follow);
+  follow();
 }
 
 start().catch((error) => report(error.message, "bad"));

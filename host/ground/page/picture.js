@@ -1,16 +1,21 @@
-// The images in an emulation's memories: the newest or a selected one, with detections drawn over it.
+// Takes images, and shows those in an emulation's memories: the newest or a selected one, with
+// detections drawn over it.
 
-import { beside, choose, disabledIf, labelled, make, note, row } from "./dom.js";
-import { drawDetections } from "./draw.js";
+import { beside, button, choose, disabledIf, labelled, make, note, row } from "./dom.js";
+import { drawDetections, MANY } from "./draw.js";
 import { ask, fetched } from "./server.js";
 import { ZoomFrame } from "./zoom.js";
 
 const NONE = { marks: [], lines: [] };
 
 export class Pictures {
-  // `setPeriod(seconds)` sets the period of updates.
-  constructor(place, about, path, setPeriod) {
-    const { controls, detections } = about.missing;
+  // `setPeriod(seconds)` sets the period of updates; `reported(what, request)` reports its answer.
+  constructor(place, about, path, setPeriod, reported) {
+    const { controls, detections, observe } = about.missing;
+    this.reported = reported;
+    this.missing = observe;
+    this.take = button("Take a picture", "take", () => this.observe(), observe);
+    this.take.className = "primary";
     this.path = path;
     const rate = choose(["1", "2", "5"], {
       id: "rate",
@@ -25,6 +30,7 @@ export class Pictures {
       make("input", { type: "checkbox", id, onchange, ...disabledIf(detections) });
     this.newest = make("input", { type: "checkbox", checked: true, id: "newest" });
     this.detections = checkbox("detections", () => this.detect());
+    this.detections.checked = !detections;
     this.detections.title ||= "read over the wire after each image; they belong to the latest one";
     this.magnitudes = checkbox("magnitudes", () => this.drawOverlay());
     this.magnitudes.title ||= "V of identified stars";
@@ -33,17 +39,26 @@ export class Pictures {
     this.canvas = make("canvas", { id: "canvas", width: 1, height: 1, role: "img" });
     this.canvas.onmousemove = (event) => this.point(event);
     this.zoomFrame = new ZoomFrame(this.canvas, () => this.drawOverlay());
-    this.hidden = note("", { id: "hidden-names" });
+    this.hidden = make("span", { id: "hidden-names" });
     const key = (kind, text) => make("li", { className: kind, textContent: text });
     this.legend = make(
       "ul",
-      { id: "detections-legend", className: "legend", hidden: true },
+      { id: "detections-legend", className: "legend", style: "visibility: hidden" },
       key("identified", "identified"),
       key("unidentified", "not identified"),
-      key("fitted", "fitted curve or window"),
+      key("fitted", "fitted"),
     );
-    this.value = note(controls ?? "no image yet");
-    place.append(
+    this.value = make("span", { id: "picture-value" });
+    this.empty = make("p", { id: "no-picture" });
+    this.empty.textContent = controls
+      ? `The image stays in the device: download it under "Commands". Here, ${controls}.`
+      : 'No image yet. Press "Take a picture".';
+    this.zoomFrame.place.append(this.empty);
+    this.showEmpty(true);
+    this.options = make(
+      "details",
+      { id: "picture-options" },
+      make("summary", { textContent: "Display options" }),
       row(
         labelled("memory", this.name),
         beside("show newest", this.newest),
@@ -52,12 +67,30 @@ export class Pictures {
         labelled("brightness", this.stretch),
         labelled("images per second", rate),
       ),
-      this.zoomFrame.place,
-      this.zoomFrame.buttons,
-      this.legend,
-      this.value,
-      this.hidden,
     );
+    const bar = row(this.take, ...this.zoomFrame.buttons);
+    const caption = make("p", { id: "caption", className: "quiet" }, this.value, this.hidden);
+    place.append(bar, this.zoomFrame.place, this.legend, caption, this.options);
+  }
+
+  async observe() {
+    this.take.disabled = true;
+    this.take.textContent = "Taking a picture …";
+    await this.reported("take a picture", ask(`${this.path}/observe`, {}));
+    this.take.textContent = "Take a picture";
+    this.take.disabled = false;
+  }
+
+  showEmpty(empty) {
+    this.empty.hidden = !empty;
+    this.zoomFrame.place.classList.toggle("no-image", empty);
+  }
+
+  // Nobody answers while virtual time is held.
+  updateTime({ held }) {
+    if (this.missing || this.take.textContent !== "Take a picture") return;
+    this.take.disabled = Boolean(held);
+    this.take.title = held ? "virtual time is paused" : "key p";
   }
 
   update(pictures, busy) {
@@ -72,23 +105,25 @@ export class Pictures {
     if (changed.length) {
       this.pending = true; // what it finds in a new picture comes when it is done with that
       this.detected = NONE;
-      this.legend.hidden = true;
+      this.legend.style.visibility = "hidden";
     }
-    if (changed.includes(this.name.value)) this.fetch();
+    const { rows, columns, stored } = pictures[this.name.value] ?? {};
+    if (rows) this.zoomFrame.place.style.setProperty("--aspect", columns / rows);
+    this.showEmpty(!stored);
+    if (!stored) this.value.textContent = rows ? `${this.name.value}: ${columns} x ${rows}, no image since power-up` : "";
+    else if (changed.includes(this.name.value)) this.fetch();
     else if (this.pending && !busy) this.detect();
   }
 
   async detect() {
     this.pending = false;
     this.detected = NONE;
-    this.legend.hidden = true;
+    this.legend.style.visibility = "hidden";
     if (this.detections.checked)
       try {
         this.detected = await ask(`${this.path}/detections/${encodeURIComponent(this.name.value)}`);
-        const { marks } = this.detected;
-        const identified = marks.filter((mark) => mark.name).length;
-        this.value.textContent = `${marks.length} detected, ${identified} identified`;
-        this.legend.hidden = false;
+        this.value.textContent = counted(this.detected.marks);
+        this.legend.style.visibility = "";
       } catch (error) {
         this.value.textContent = error.message;
       }
@@ -136,7 +171,7 @@ export class Pictures {
     const hidden = this.zoomFrame.drawOver((pen, place, size) =>
       drawDetections(pen, this.detected, place, size, this.magnitudes.checked),
     );
-    this.hidden.textContent = hidden ? `names hidden: ${hidden}; zoom in to read them` : "";
+    this.hidden.textContent = hidden ? `; names hidden: ${hidden}; zoom in to read them` : "";
   }
 
   point(event) {
@@ -148,4 +183,13 @@ export class Pictures {
     const value = this.pixels.data[4 * (row * width + column)];
     this.value.textContent = `column ${column}, row ${row}: ${value}`;
   }
+}
+
+// What was detected in words: marks of one kind share a name, such as "edge".
+function counted(marks) {
+  const names = new Map();
+  for (const { name } of marks) names.set(name, (names.get(name) ?? 0) + 1);
+  const common = [...names].filter(([name, count]) => name && count >= MANY);
+  if (common.length) return common.map(([name, count]) => `${count} points of "${name}" detected`).join(", ");
+  return `${marks.length} detected, ${marks.length - (names.get("") ?? 0)} identified`;
 }

@@ -1,13 +1,11 @@
-// The latest results beside the truth, pointings on a map of the sky, and the log of results.
+// What the latest result has beside its angles, pointings on a map of the sky, and the log of results.
 
 import { atNextFrame, beside, button, disabledIf, make, row } from "./dom.js";
 import { disc, line, ring } from "./draw.js";
 import { saveFile } from "./server.js";
-import { apart, fromParts } from "./sphere.js";
 
 const TRAIL = 600;
 const GRID_DEG = 30;
-const [ALPHA, BETA] = ["_alpha_deg", "_beta_deg"]; // ends of the names of a direction's angles
 
 export class Results {
   // `subscribe(on)` requests results in every update.
@@ -21,7 +19,6 @@ export class Results {
     this.table = make("tbody");
     this.sky = make("canvas", { width: 720, height: 400, role: "img", hidden: true });
     this.sky.setAttribute("aria-label", "pointings of the sensor on the sky");
-    const heads = ["", "measured", "truth", "error"].map((text) => make("th", { textContent: text }));
     const name = about.device.toLowerCase();
     const file = (end) => () => saveFile(`${path}/results/${end}`, `${name}.${end}`, report);
     place.append(
@@ -31,7 +28,7 @@ export class Results {
         button("Save log as Parquet", "save-parquet", file("parquet"), none ?? about.missing.parquet),
         this.count,
       ),
-      make("table", {}, make("thead", {}, make("tr", {}, ...heads)), this.table),
+      make("table", {}, this.table),
       this.sky,
     );
     subscribe(this.on.checked);
@@ -43,20 +40,12 @@ export class Results {
       this.count.textContent = results.error;
       return;
     }
-    const rows = Object.entries(results).map(([name, value]) => {
-      const true_ = name.endsWith("_deg") ? truth[name] : undefined;
-      const known = true_ !== undefined && true_ !== null;
-      const error = known && value !== null ? wrapped(value - true_) : null;
-      if (known) return tableRow(name, text(name, value), text(name, true_), error);
-      const all = make("td", { className: "value", colSpan: 3, textContent: text(name, value) });
-      return make("tr", {}, make("th", { scope: "row", textContent: name }), all);
-    });
-    for (const { name, answer, true_ } of directions(results, truth)) {
-      const error = answer && apart(answer, true_);
-      const shown = tableRow(`${name} direction`, answer ? components(answer) : "–", components(true_), error);
-      shown.className = "direction";
-      rows.push(shown);
-    }
+    const rows = Object.entries(results)
+      .filter(([name]) => !name.endsWith("_deg"))
+      .map(([name, value]) => {
+        const head = make("th", { scope: "row", textContent: name.replaceAll("_", " ") });
+        return make("tr", {}, head, make("td", { className: "value", textContent: text(value) }));
+      });
     this.table.replaceChildren(...rows);
     this.count.textContent = `${logged} lines in the log`;
     if (!("ra_deg" in results)) return;
@@ -104,35 +93,7 @@ export class Results {
   }
 }
 
-// Directions with a known truth, as unit vectors; `answer` is null if nothing was detected.
-function directions(results, truth) {
-  const names = Object.keys(results).filter((name) => name.endsWith(ALPHA));
-  return names.flatMap((alpha) => {
-    const name = alpha.slice(0, -ALPHA.length);
-    const beta = name + BETA;
-    const numbers = (from) => [from[alpha], from[beta]].every((part) => typeof part === "number");
-    if (!numbers(truth)) return [];
-    const answer = numbers(results) ? fromParts(results[alpha], results[beta]) : null;
-    return [{ name, answer, true_: fromParts(truth[alpha], truth[beta]) }];
-  });
-}
-
-function components(vector) {
-  return vector.map((part) => part.toFixed(4)).join(" ");
-}
-
-function tableRow(name, answer, true_, error) {
-  const texts = [answer, true_, error === null ? "–" : error.toFixed(4)];
-  const cells = texts.map((text) => make("td", { className: "value", textContent: text }));
-  return make("tr", {}, make("th", { scope: "row", textContent: name }), ...cells);
-}
-
-function wrapped(deg) {
-  return ((((deg + 180) % 360) + 360) % 360) - 180;
-}
-
-function text(name, value) {
+function text(value) {
   if (value === null) return "–";
-  const whole = typeof value !== "number" || (Number.isInteger(value) && !name.endsWith("_deg"));
-  return whole ? String(value) : value.toFixed(5);
+  return typeof value !== "number" || Number.isInteger(value) ? String(value) : value.toFixed(5);
 }

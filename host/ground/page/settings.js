@@ -58,13 +58,13 @@ export class Settings {
     const act = button(`Read ${what}s`, `read-${id}`, readAll, missing);
     place.append(row(act, status));
     if (!list.length) return;
-    const titles = [what, "value", "default", ""];
+    const titles = [what, "value", "default", "unit"];
     const head = titles.map((title) => make("th", { textContent: title, scope: "col" }));
     const body = make("tbody", { id: `${id}-rows` }, ...rows.map(({ element }) => element));
     const summary = make("summary", { textContent: `${list.length} ${what}s` });
     const table = make("table", {}, make("thead", {}, make("tr", {}, ...head)), body);
     place.append(
-      make("details", { open: id === "settings" }, summary, make("div", { className: "frame" }, table)),
+      make("details", { open: id === "settings" }, summary, make("div", { className: "frame", tabIndex: 0, role: "group", ariaLabel: summary.textContent }, table)),
     );
   }
 

@@ -2,6 +2,7 @@
 
 import { atNextFrame, beside, choose, labelled, make, note, row } from "./dom.js";
 
+const HEIGHT = 260;
 const MOST_POINTS = 3600; // of a plot: one hour at one point per second
 
 const COLOURS = ["#2f81f7", "#d29922", "#3fb950", "#db61a2", "#a371f7", "#f0883e"];
@@ -103,6 +104,7 @@ export class Telemetry {
     }
     const text = getComputedStyle(document.body).color;
     const axis = { stroke: text, grid: { stroke: "#8884", width: 1 } };
+    const time = { ...axis, label: "time of day; drag to zoom, double click for all" };
     const units = new Set(this.plotted.map((p) => p.field.unit).filter(Boolean));
     const series = this.plotted.map((p, index) => ({
       label: `${p.frame}.${p.field.name}${p.field.unit ? ` [${p.field.unit}]` : ""}`,
@@ -113,9 +115,9 @@ export class Telemetry {
     this.plot = new globalThis.uPlot(
       {
         width: this.figure.clientWidth || 300,
-        height: 220,
-        axes: [axis, { ...axis, label: [...units].join(", ") || "value" }],
-        series: [{}, ...series],
+        height: HEIGHT,
+        axes: [time, { ...axis, label: [...units].join(", ") || "value" }],
+        series: [{ label: "time" }, ...series],
       },
       data,
       this.figure,
@@ -123,7 +125,7 @@ export class Telemetry {
   }
 
   fit() {
-    this.plot?.setSize({ width: this.figure.clientWidth, height: 220 });
+    if (this.figure.clientWidth) this.plot?.setSize({ width: this.figure.clientWidth, height: HEIGHT });
   }
 }
 

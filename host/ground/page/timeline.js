@@ -11,7 +11,7 @@ const TEXT = 20; // above the band
 const FOOT = 22;
 const PADDING = 32; // of the section, left and right
 const COLOURS = ["#58a6ff", "#d29922", "#3fb950", "#db61a2", "#a98bf7", "#f0883e", "#9aa3af"];
-const STRIPES = 6; // width; a colour that is used again is striped
+const STRIPES = 6; // width
 
 export class Timeline {
   // `subscribe(names)` requests telemetry frames in every update.
@@ -19,7 +19,6 @@ export class Timeline {
     this.subscribe = subscribe;
     this.drawSoon = atNextFrame(() => this.draw());
     this.bands = new Map();
-    this.colours = new Map();
     this.chosen = new Map(); // frame and field by the name of the band
     this.fields = new Map(
       about.telemetries
@@ -95,14 +94,6 @@ export class Timeline {
     this.drawSoon();
   }
 
-  // The colour, and whether it is striped.
-  colourOf(word) {
-    const number = this.colours.size;
-    if (!this.colours.has(word))
-      this.colours.set(word, [COLOURS[number % COLOURS.length], number >= COLOURS.length]);
-    return this.colours.get(word);
-  }
-
   draw() {
     if (!this.canvas.isConnected) return; // another target is shown
     const height = this.bands.size ? ROW * this.bands.size + FOOT : 1;
@@ -147,7 +138,7 @@ export class Timeline {
   }
 
   band(pen, word, left, top, wide, high) {
-    const [colour, striped] = this.colourOf(word);
+    const [colour, striped] = colourOf(word);
     pen.fillStyle = colour;
     pen.fillRect(left, top, wide, high);
     pen.fillStyle = "#0006";
@@ -165,11 +156,19 @@ export class Timeline {
     if (shown.join() === words.join()) return;
     this.legend.replaceChildren(
       ...words.map((word) => {
-        const [colour, striped] = this.colourOf(word);
+        const [colour, striped] = colourOf(word);
         const swatch = make("span", { className: striped ? "swatch striped" : "swatch" });
         swatch.style.backgroundColor = colour;
         return make("li", {}, swatch, word);
       }),
     );
   }
+}
+
+// The colour of a word, and whether it is striped: always the same ones (FNV-1a of its letters).
+function colourOf(word) {
+  let number = 0x811c9dc5;
+  for (const letter of word) number = Math.imul(number ^ letter.codePointAt(0), 0x01000193) >>> 0;
+  const kind = (number >>> 8) % (2 * COLOURS.length);
+  return [COLOURS[kind % COLOURS.length], kind >= COLOURS.length];
 }

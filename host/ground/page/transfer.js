@@ -30,7 +30,7 @@ export class Transfer {
     this.status = note([download, upload].filter(Boolean).join("; "), { id: "transfer-status" });
     place.append(
       row(
-        labelled("", this.source),
+        this.source.hidden ? null : labelled("memory", this.source),
         button("Download", "download", start, download),
         this.pause,
         this.cancel,

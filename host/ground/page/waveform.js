@@ -36,7 +36,7 @@ export class Waveform {
       ),
       this.status,
       this.steps,
-      make("div", { className: "frame" }, this.canvas),
+      make("div", { className: "frame", tabIndex: 0, role: "group", ariaLabel: "waveform" }, this.canvas),
     );
   }
 

@@ -1,6 +1,6 @@
 // A frame that zooms and moves an image by keys, buttons, wheel or pointer.
 
-import { button, make, row } from "./dom.js";
+import { button, make } from "./dom.js";
 import { sharpPen } from "./draw.js";
 
 const LARGEST = 16; // relative to the fitted image
@@ -30,11 +30,11 @@ export class ZoomFrame {
       if (!this.frame.hasPointerCapture(event.pointerId)) return;
       this.frame.scrollBy(-event.movementX, -event.movementY);
     };
-    this.buttons = row(
-      button("Zoom in", "zoom-in", () => this.scale(STEP)),
-      button("Zoom out", "zoom-out", () => this.scale(1 / STEP)),
+    this.buttons = [
+      named("+", "Zoom in", "zoom-in", () => this.scale(STEP)),
+      named("−", "Zoom out", "zoom-out", () => this.scale(1 / STEP)),
       button("Fit", "zoom-fit", () => this.scale(0)),
-    );
+    ];
     new ResizeObserver(() => this.changed()).observe(this.frame);
   }
 
@@ -85,4 +85,10 @@ export class ZoomFrame {
     frame.scrollTop += y * (after.height - before.height);
     this.changed();
   }
+}
+
+function named(sign, name, id, act) {
+  const made = button(sign, id, act);
+  made.ariaLabel = made.title = name;
+  return made;
 }

@@ -43,7 +43,11 @@ class Hurried:
             return self._state()
         if path.endswith("/pictures"):
             number = self._second // PICTURE_EVERY
-            return {"pictures": {"SRAM": {"rows": 512, "columns": 1024, "changed_s": number}}}
+            return {
+                "pictures": {
+                    "SRAM": {"rows": 512, "columns": 1024, "changed_s": number, "stored": True}
+                }
+            }
         if "/log" in path:
             since = int(path.rpartition("=")[2] or 0)
             until = max(since, self._second)

@@ -22,7 +22,7 @@ export class Scene {
     const none = disabledIf(formless);
     this.kind = choose([], { id: "scene-kind", onchange: () => this.choose(this.kind.value), ...none });
     this.what = choose([], { id: "scene-what", onchange: () => this.show(), ...none });
-    this.place = make("div", { id: "scene-keys" });
+    this.place = make("div", { id: "scene-keys", tabIndex: 0, role: "group", ariaLabel: "keys of the scene" });
     this.place.addEventListener("focusin", (event) => {
       if (event.target.title) this.help.textContent = event.target.title;
     });

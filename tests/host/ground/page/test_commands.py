@@ -75,7 +75,7 @@ def test_saved_lines_are_kept_per_device(page: Any) -> None:
     page.fill("#line", HOSTILE)
     page.click("#save-line")
     page.reload()
-    page.wait_for_selector("#line")
+    page.wait_for_selector("#take")
     look(page, "CubeStar")
     assert page.locator("#saved-lines li").count() == 0
     look(page, "CubeSense")

@@ -31,7 +31,7 @@ def lives(page: Any, change: Change) -> None:
 
     page.route_web_socket("**/live", connect)
     page.reload()
-    page.wait_for_selector("#line")
+    page.wait_for_selector("#take")
 
 
 @pytest.mark.parametrize("missing", [True, False])
@@ -50,7 +50,7 @@ def test_device_texts_are_escaped(page: Any, missing: bool) -> None:
     page.wait_for_selector(f"nav >> text={HOSTILE}")
     for number in (0, 1):
         page.locator("nav button").nth(number).click()
-        page.wait_for_selector("#line")
+        page.wait_for_selector("#take")
         line(page, HOSTILE)
         for chooser in ("#command", "#frame"):
             for option in page.locator(f"{chooser} option").all_inner_texts()[:5]:
@@ -71,9 +71,9 @@ def test_live_texts_are_escaped(page: Any) -> None:
     page.click("#snapshot")
     page.wait_for_selector("#lines li.good >> text=snapshot")
     lives(page, change)
-    for place in ("#lines li", "#results td", "#timeline-status", "#supplies li", "#state"):
-        page.locator(place).filter(has_text=HOSTILE).first.wait_for()
-    page.locator("#telemetry td").filter(has_text=HOSTILE).first.wait_for()
+    for place in ("#lines li", "#results td", "#summary", "#supplies li", "#state"):
+        page.locator(place).filter(has_text=HOSTILE).first.wait_for(state="attached")
+    page.locator("#telemetry td").filter(has_text=HOSTILE).first.wait_for(state="attached")
     for chooser in ("#snapshots option", "#picture-name option"):
         page.locator(chooser).filter(has_text=HOSTILE).first.wait_for(state="attached")
 
@@ -91,9 +91,9 @@ def test_live_errors_are_escaped(page: Any) -> None:
         }
 
     lives(page, change)
-    for place in ("#link-health", "#transfer-status", "#telemetry p", "#results", "#state"):
-        page.locator(place).filter(has_text=HOSTILE).first.wait_for()
-    page.locator("#attitude-status").filter(has_text=HOSTILE).wait_for()
+    for place in ("#link-health", "#transfer-status", "#telemetry p", "#summary", "#state"):
+        page.locator(place).filter(has_text=HOSTILE).first.wait_for(state="attached")
+    page.locator("#attitude-status").filter(has_text=HOSTILE).wait_for(state="attached")
 
 
 def test_answers_are_escaped(page: Any) -> None:
@@ -102,9 +102,10 @@ def test_answers_are_escaped(page: Any) -> None:
     page.route("**/sensor-registers/*", lambda route: route.fulfill(json=answer))
     page.click("#read-sensor")
     page.click("#settings summary >> text=image sensor register")
-    page.locator("#sensor-rows td").filter(has_text=HOSTILE).first.wait_for()
+    page.locator("#sensor-rows td").filter(has_text=HOSTILE).first.wait_for(state="attached")
     star = {"x": 500, "y": 200, "name": HOSTILE, "v_mag": 1.0}
     page.route("**/detections/*", lambda r: r.fulfill(json={"marks": [star], "lines": []}))
+    page.uncheck("#detections")
     page.check("#detections")
     page.wait_for_selector("#picture >> text=/1 detected, 1 identified/")
     for path in ("shell", "pause", "sensor-registers/*", "detections/*", "download"):
@@ -115,17 +116,17 @@ def test_answers_are_escaped(page: Any) -> None:
     page.click("#read-sensor")
     line(page, "help")
     bad = page.locator("#lines li.bad").filter(has_text=HOSTILE)
-    bad.nth(before + 3).wait_for()
+    bad.nth(before + 3).wait_for(state="attached")
     page.uncheck("#detections")
     page.check("#detections")
-    page.locator("#picture p").filter(has_text=HOSTILE).first.wait_for()
+    page.locator("#caption").filter(has_text=HOSTILE).first.wait_for(state="attached")
 
 
 def test_scene_and_snapshot_names_are_escaped(page: Any) -> None:
     page.click("#scene summary >> text=scene file")
     page.fill("#scene-text", f"kind = '{HOSTILE}'")
     page.click("#apply-file")
-    page.locator("#lines li.bad").filter(has_text=HOSTILE).wait_for()
+    page.locator("#lines li.bad").filter(has_text=HOSTILE).wait_for(state="attached")
     path = "/targets/0/snapshot"
     page.evaluate(
         "([path, name]) => fetch(path, {method: 'POST', body: JSON.stringify({name})})",

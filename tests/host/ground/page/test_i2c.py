@@ -42,7 +42,7 @@ def test_telemetry_and_commands_use_the_bus(page: Any) -> None:
     page.wait_for_selector(f"#link >> text=i2c:{BUS}:0x1b")
     line(page, "write DetectionThreshold1 77")
     page.select_option("#frame", "Configuration")
-    page.locator("#telemetry td.value").first.filter(has_text="77").wait_for()
+    page.locator("#telemetry td.value").first.filter(has_text="77").wait_for(state="attached")
     assert "is not a serial line" in page.inner_text("#commands")
     page.click("nav >> text=CubeStar")
     page.wait_for_selector(f"#link >> text=i2c:{BUS}:0x1a")

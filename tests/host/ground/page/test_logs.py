@@ -31,7 +31,7 @@ def test_csv_and_parquet_tables_are_equal(chromium: Any, tmp_path: Path) -> None
     with station("emulated:cubestar", "--seed", "5") as address, shown(chromium, address) as page:
         line(page, "write setDetectionThresholds 33 34")
         line(page, "write CaptureAndProcess")
-        page.locator("#attitude-status").filter(has_text="measured").wait_for()
+        page.locator("#attitude-status").filter(has_text="measured").wait_for(state="attached")
         page.uncheck("#results-on")
         for name, buttons in (
             ("results", ("#save", "#save-parquet")),
@@ -71,7 +71,7 @@ def test_saved_session_is_opened_later(chromium: Any, tmp_path: Path) -> None:
     with station(str(path)) as address, shown(chromium, address) as page:
         page.select_option("#frame", "Configuration")
         page.press("#playback-position", "End")
-        page.locator("#telemetry td.value").first.filter(has_text="77").wait_for()
+        page.locator("#telemetry td.value").first.filter(has_text="77").wait_for(state="attached")
         assert saved(page, "#recording", tmp_path / "again.rec").read_bytes() == path.read_bytes()
         rows = rows_of(saved(page, "#transcript-csv", tmp_path / "said.csv"))
     assert "DetectionThreshold1" in {row["message"] for row in rows}

@@ -116,7 +116,7 @@ def test_server_memory_does_not_grow(server: Any, begin_s: int, end_s: int) -> N
 
 
 def measured(page: Any) -> Page:
-    session = page.context.new_cdp_session(page)
+    session = page.context.new_cdp_session(page.page)
     session.send("Performance.enable")
     session.send("HeapProfiler.collectGarbage")
     session.send("HeapProfiler.collectGarbage")

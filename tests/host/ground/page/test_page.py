@@ -1,6 +1,7 @@
 from typing import Any
 
 import pytest
+from axe_playwright_python.sync_playwright import Axe
 
 from tests.tiers import quick
 
@@ -10,8 +11,11 @@ pytestmark = pytest.mark.xdist_group("page")  # so that its emulations are start
 
 
 def test_attitude_error_sphere_and_task_status_are_shown(page: Any) -> None:
-    page.select_option("#command", "CaptureAndProcess")
-    page.click("#send")
+    assert page.is_visible("#no-picture")  # no noise before the first image
+    page.click("#take")
+    page.wait_for_selector("#summary >> text=/^[1-9][0-9]* of [0-9]+ stars identified/")
+    page.wait_for_selector("#angles td >> text=/^-?[0-9.]+″$/")
+    assert not page.is_visible("#no-picture")
     told = page.locator("#attitude-status")
     page.wait_for_function(
         "() => / total error [0-9.]+°$/"
@@ -23,8 +27,8 @@ def test_attitude_error_sphere_and_task_status_are_shown(page: Any) -> None:
     assert page.evaluate("document.querySelector('#sphere').toDataURL()") != before
     page.wait_for_selector("#timeline-status >> text=/task CALCULATED/")
     # More stars than it lists, which is a flag of its own.
-    page.wait_for_selector("#health li.lit >> text=MaxStarsDetection")
-    assert page.locator("#health li.lit").count() == 1
+    page.wait_for_selector("#flags-set li.notice >> text=MaxStarsDetection")
+    assert page.locator("#set-ErrorFlags li").count() == 1
     assert " 0 failed" in page.inner_text("#link-health")
     assert "imager" in page.inner_text("#supplies")
 
@@ -135,23 +139,31 @@ def test_two_tabs_show_different_targets(chromium: Any, address: str, page: Any)
 
 
 def test_tab_key_reaches_every_control_in_order(page: Any) -> None:
-    page.wait_for_selector("#sphere:visible")
-    page.focus("#picture-name")
+    page.click("#tab-commands")
+    page.focus("#freeze")
     reached = list[str]()
-    for _ in range(80):
+    for _ in range(40):
         reached.append(page.evaluate("document.activeElement.id"))
         page.keyboard.press("Tab")
-    sought = ("magnitudes", "zoom-frame", "sphere", "band", "add-band", "lamps-ErrorFlags")
+    sought = ("freeze", "take", "zoom-in", "tab-commands", "command", "send", "line")
     at = [reached.index(name) for name in sought]
     assert at == sorted(at)
 
 
 def test_page_works_with_the_keyboard_only(page: Any) -> None:
-    page.focus("#newest")
-    for _ in range(150):
-        page.keyboard.press("Tab")
-        if page.evaluate("document.activeElement.id") == "pause":
-            break
+    page.focus("#take")
+
+    def tab_to(name: str) -> None:
+        for _ in range(60):
+            if page.evaluate("document.activeElement.id") == name:
+                return
+            page.keyboard.press("Tab")
+
+    tab_to(page.evaluate("document.querySelector('[aria-selected=true]').id"))
+    page.keyboard.press("Home")
+    for _ in range(5):
+        page.keyboard.press("ArrowRight")
+    tab_to("pause")
     page.keyboard.press("Enter")
     page.wait_for_selector("#pause[aria-pressed=true]")
     page.keyboard.press("Space")
@@ -168,6 +180,80 @@ def test_page_has_no_overflow_overlap_or_low_contrast(
             look(page, device)
             page.click("#add-band")
             page.wait_for_selector("#timeline-legend li")
-            check_layout(page, width)
+            for number in range(1, page.locator("[role=tab]").count() + 1):
+                page.click("h1")
+                page.keyboard.press(str(number))
+                check_layout(page, width)
+                assert Axe().run(page).response["violations"] == []
         dark = page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(20, 23, 28)"
         assert dark == (scheme == "dark")
+
+
+@pytest.mark.parametrize(("width", "height"), [(1280, 900), (390, 844)])
+def test_first_minute_needs_one_click_and_no_scrolling(
+    chromium: Any, address: str, width: int, height: int
+) -> None:
+    with shown(chromium, address, viewport={"width": width, "height": height}) as page:
+        for device in ("CubeStar", "CubeSense", "AraMiS"):
+            look(page, device)
+            page.wait_for_selector("#angles")
+            before = page.evaluate(PLACES)
+            page.click("#take")
+            page.wait_for_selector("#lines li.good >> text=take a picture")
+            page.wait_for_selector("#angles td >> text=/[0-9]/")
+            assert page.evaluate("scrollY") == 0
+            places = page.evaluate(PLACES)
+            assert all(top >= 0 and bottom <= height for top, bottom in places.values())
+            if width > 1000:  # nothing jumps
+                assert places == before
+
+
+PLACES = """() => {
+  const ids = ["link", "take", "zoom-frame", "summary", "angles"];
+  return Object.fromEntries(ids.map((id) => {
+  const { top, bottom } = document.getElementById(id).closest(".under, :not(.under *)")
+    .getBoundingClientRect();
+  return [id, [Math.round(top), Math.round(bottom)]];
+}))}"""
+"""Top and bottom of what an operator needs at once."""
+
+
+def test_address_names_the_target_and_the_tab(chromium: Any, address: str) -> None:
+    with shown(chromium, address) as page:
+        look(page, "CubeSense")
+        page.click("#tab-faults")
+        assert page.evaluate("location.hash") == "#CubeSense/faults"
+        page.reload()
+        page.wait_for_selector("#inject", state="visible")
+        assert page.title().startswith("CubeSense")
+
+
+def test_risky_command_asks_first(page: Any) -> None:
+    assert page.evaluate("document.querySelector('#command').value") == "setDelayTimerTimeout"
+    page.select_option("#command", "Reset")
+    page.click("#send")
+    page.wait_for_selector("dialog >> text=The program restarts")
+    before = page.locator("#lines li").count()
+    page.click("dialog >> text=Cancel")
+    assert page.locator("#lines li").count() == before
+    page.click("#send")
+    page.click("#confirm")
+    page.wait_for_selector("#lines li.good >> text=write Reset")
+
+
+def test_paused_display_holds_its_values(chromium: Any, address: str, page: Any) -> None:
+    def seconds(of: Any) -> float:
+        return float(of.inner_text("#time").split()[0])
+
+    page.click("#freeze")
+    held = seconds(page)
+    with shown(chromium, address) as other:
+        look(other, "CubeStar")
+        other.wait_for_function(
+            "(held) => parseFloat(document.querySelector('#time').textContent) > held + 3", arg=held
+        )
+        assert seconds(page) < held + 2  # at most the update that was under way
+    page.click("#freeze")
+    page.wait_for_function(
+        "(held) => parseFloat(document.querySelector('#time').textContent) > held + 3", arg=held
+    )

@@ -43,7 +43,7 @@ def test_found_edges_are_drawn(page: Any) -> None:
     page.wait_for_selector("#attitude-status >> text=CubeSense reports no attitude")
     page.check("#detections")
     line(page, "write CaptureAndDetect Camera=NADIR Sram=SRAM2")
-    page.wait_for_selector("#picture >> text=/^[1-9][0-9]* detected/")
+    page.wait_for_selector("#picture >> text=/^[1-9][0-9]* (points of .* )?detected/")
     assert page.evaluate(GREEN) > 50
     assert page.locator("#detections-legend").is_visible()
 

@@ -81,14 +81,14 @@ def test_page_reconnects(chromium: Any, relayed: tuple[Relay, str]) -> None:
         line(page, "write DetectionThreshold1 77")
         page.select_option("#frame", "Configuration")
         value = page.locator("#telemetry td.value").first
-        value.filter(has_text="77").wait_for()
+        value.filter(has_text="77").wait_for(state="attached")
         relay.cut()
-        page.locator("#link.bad").filter(has_text="reconnecting").wait_for()
+        page.locator("#link.bad").filter(has_text="reconnecting").wait_for(state="attached")
         assert "does not answer" in line(page, "read Identification")
         relay.up = True
         page.wait_for_selector("#link:not(.bad) >> text=emulated:cubesense")
         line(page, "write DetectionThreshold1 78")
-        value.filter(has_text="78").wait_for()
+        value.filter(has_text="78").wait_for(state="attached")
         assert page.evaluate("window.here")
 
 
@@ -102,7 +102,9 @@ def test_page_reports_another_program_at_its_address(
         relay.cut()
         relay.to_port = urlsplit(other).port or 0
         relay.up = True
-        page.locator("#link.bad").filter(has_text="open the printed address").wait_for()
+        page.locator("#link.bad").filter(has_text="open the printed address").wait_for(
+            state="attached"
+        )
 
 
 @pytest.mark.slow

@@ -184,18 +184,20 @@ def test_earth_and_moon_are_placed_on_the_map(page: Any) -> None:
 @pytest.mark.slow
 def test_directions_are_compared_with_the_truth(page: Any) -> None:
     stage(page, "CubeSense")
-    row = page.locator("#results tr.direction", has_text="nadir direction")
+    row = page.locator("#angles tr", has_text="nadir direction")
     for camera, memory in (("NADIR", "SRAM2"), ("SUN", "SRAM1")):
         page.fill("#line", f"write CaptureAndDetect Camera={camera} Sram={memory}")
         page.press("#line", "Enter")
-        page.wait_for_selector(f"#results tr:has-text('{camera.lower()}_detect') >> text=SUCCESS")
-        direction = f"#results tr.direction:has-text('{camera.lower()}')"
-        page.wait_for_selector(f"{direction} >> text=/^0[.]/")
-    cells = row.locator("td").all_inner_texts()
-    answer, truth = (np.array([float(part) for part in cell.split()]) for cell in cells[:2])
+        page.wait_for_selector(f"#results tr:has-text('{camera.lower()} detect') >> text=SUCCESS")
+        direction = f"#angles tr:has-text('{camera.lower()} direction')"
+        page.wait_for_selector(f"{direction} >> text=/^[0-9.]+[°″]$/")
+    texts = row.get_attribute("title").replace("measured ", "").split(", true ")
+    answer, truth = (np.array([float(part) for part in one.split()]) for one in texts)
     angle = math.degrees(float(np.linalg.norm(answer - truth)))
-    assert float(cells[2]) == pytest.approx(angle, abs=0.02)
-    assert float(cells[2]) < 1.0
+    error = row.locator("td").last.inner_text()
+    shown_deg = float(error[:-1]) / (3600 if error.endswith("″") else 1)
+    assert shown_deg == pytest.approx(angle, abs=0.02)
+    assert shown_deg < 1.0
     with page.expect_download() as saving:
         page.click("#save")
     header = saving.value.path().read_text("utf-8").splitlines()[0].split(",")
@@ -230,7 +232,7 @@ def test_scene_keys_are_escaped(chromium: Any, address: str) -> None:
         page.route("**/scene/keys", evil)
         page.route("**/stars", lambda route: route.fulfill(json=hostile(route.fetch().json())))
         page.reload()
-        page.wait_for_selector("#line")
+        page.wait_for_selector("#take")
         stage(page, "CubeStar")
         page.fill(f"[aria-label='{HOSTILE}']", "3")
         told(page, "/unknown key/")

@@ -46,7 +46,7 @@ def test_live_values_are_read_over_the_line(chromium: Any, tmp_path: Path, recor
             values = recorded.node.told[name]
             field = next(one.name for one in recorded.node.interface.telemetry(name).fields)
             shows = cell(page, field).first
-            shows.filter(has_text=str(values[field])).wait_for()
+            shows.filter(has_text=str(values[field])).wait_for(state="attached")
         assert f"Threshold1: {values['Threshold1']}" in line(page, "read Configuration")
         assert str(tmp_path / "ours") in page.inner_text("#link")
         assert " 0 failed" in page.inner_text("#link-health")
@@ -61,7 +61,7 @@ def test_wrong_baud_rate_is_reported(chromium: Any, tmp_path: Path, recorded: An
         opened(chromium, tmp_path / "ours", "--baud", "19200") as page,
     ):
         told = f"it answers at {BAUD} baud, and this is 19200"
-        page.locator("#link-health.bad").filter(has_text=told).wait_for()
+        page.locator("#link-health.bad").filter(has_text=told).wait_for(state="attached")
         assert told in line(page, "read Configuration")
 
 
@@ -76,14 +76,14 @@ def test_page_recovers_from_an_unplugged_cable(
         page.select_option("#frame", "Configuration")
         value = recorded.node.told["Configuration"]["Threshold1"]
         shows = cell(page, "Threshold1").first
-        shows.filter(has_text=str(value)).wait_for()
+        shows.filter(has_text=str(value)).wait_for(state="attached")
     try:
         page.wait_for_selector("#link.bad")
-        shows.filter(has_not_text=str(value)).wait_for()
+        shows.filter(has_not_text=str(value)).wait_for(state="attached")
         assert str(ends[0]) in page.inner_text("#link-health")
         recorded.node.told["Configuration"] |= {"Threshold1": value - 5}
         with cable(*ends, recorded):
-            shows.filter(has_text=str(value - 5)).wait_for()
+            shows.filter(has_text=str(value - 5)).wait_for(state="attached")
             page.wait_for_selector("#link:not(.bad)")
             assert page.evaluate("window.here")
     finally:
