@@ -7,14 +7,19 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from PIL import Image, UnidentifiedImageError
+from PIL import Image, ImageOps, UnidentifiedImageError
 
 from cubestack.emulator.scene.attitude import unit_quaternion
 from cubestack.emulator.scene.file import SceneError
+from cubestack.emulator.scene.fits import FITS_START, read_fits
 from cubestack.firmware_model.formats.untrusted import LARGEST_PICTURE, read_bytes, shown
 from cubestack.firmware_model.values import DeclaredValues, positive, vector, whole
 
 FORMATS = ("PNG", "JPEG", "TIFF")
+ACCEPTED = (*FORMATS, "FITS")
+DEPTHS = (8, 10, 12, 14, 16)
+"""Bits that a file of 16 bits may use: a camera's converter often has fewer."""
+
 
 MOST_PIXELS = 50_000_000
 """Four bytes each while a colour picture is converted."""
@@ -22,7 +27,7 @@ MOST_PIXELS = 50_000_000
 
 @dataclass(frozen=True, eq=False)
 class PictureScene(DeclaredValues):
-    """A picture file as the light on a sensor: PNG, JPEG or TIFF, grey or colour.
+    """A picture file as the light on a sensor: PNG, JPEG, TIFF or FITS, grey or colour.
 
     Attributes:
         file: the picture.
@@ -91,6 +96,10 @@ def load_picture(file: Path) -> NDArray[np.uint8]:
 
 def decode_picture(content: bytes, name: str) -> NDArray[np.uint8]:
     """As ``load_picture``, from the content of the file ``name``."""
+    if content.startswith(FITS_START):
+        pixels = upper_bits(read_fits(content, name, MOST_PIXELS))
+        pixels.flags.writeable = False
+        return pixels
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the size is checked here
@@ -98,18 +107,19 @@ def decode_picture(content: bytes, name: str) -> NDArray[np.uint8]:
             with image:
                 if image.format not in FORMATS:
                     raise SceneError(
-                        f"{name} is a {image.format} picture; accepted are {', '.join(FORMATS)}"
+                        f"{name} is a {image.format} picture; accepted are {', '.join(ACCEPTED)}"
                     )
                 if image.width * image.height > MOST_PIXELS:
                     raise SceneError(
                         f"{name} has {image.width} x {image.height} pixels; accepted are "
                         f"{MOST_PIXELS // 10**6} million at most"
                     )
-                pixels = _grey(name, image)
+                # Cameras store how they were held; the sensor's light is as people see it.
+                pixels = _grey(name, ImageOps.exif_transpose(image))
     except SceneError:
         raise
     except UnidentifiedImageError:
-        raise SceneError(f"{name} is not a picture; accepted are {', '.join(FORMATS)}") from None
+        raise SceneError(f"{name} is not a picture; accepted are {', '.join(ACCEPTED)}") from None
     except Exception as error:  # damaged data can cause any error in Pillow's decoders
         raise SceneError(f"{name} can not be read: {shown(str(error))}") from None
     pixels.flags.writeable = False
@@ -117,13 +127,19 @@ def decode_picture(content: bytes, name: str) -> NDArray[np.uint8]:
 
 
 def _grey(name: str, image: Image.Image) -> NDArray[np.uint8]:
-    """8-bit grey values; colours by their luma, 16 bits by their upper 8."""
+    """8-bit grey values; colours by their luma, more bits by the upper 8 of those in use."""
     if image.mode.startswith("I;16"):
-        wide: NDArray[np.uint16] = np.asarray(image).astype(np.uint16)
-        return (wide >> 8).astype(np.uint8)
+        return upper_bits(np.asarray(image).astype(np.uint16))
     if image.mode not in ("1", "L", "LA", "P", "RGB", "RGBA", "CMYK", "YCbCr"):
         raise SceneError(
             f"{name} has pixels of kind {image.mode}; accepted are 8 or 16 bits of grey, "
             "or 8 bits of each colour"
         )
     return np.array(image.convert("L"), np.uint8)
+
+
+def upper_bits(wide: NDArray[np.uint16]) -> NDArray[np.uint8]:
+    """The upper 8 of the bits that are in use: 8, 10, 12, 14 or 16."""
+    brightest = int(wide.max(initial=0))
+    bits = next(depth for depth in DEPTHS if brightest < 1 << depth)
+    return np.asarray(wide >> (bits - 8), np.uint8)

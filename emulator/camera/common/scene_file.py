@@ -134,7 +134,7 @@ def _sky_keys(
 def _picture_keys(condition: SkyCondition) -> declare.Keys:
     temperature = {"temperature_c": SkyCondition.declared()["temperature_c"]}
     return {
-        "file": declare.text(declare.REQUIRED, "PNG, JPEG or TIFF"),
+        "file": declare.text(declare.REQUIRED, "PNG, JPEG, TIFF or FITS"),
         **PictureScene.declared(),
         **_with_defaults(temperature, condition),
         "hazards": hazard_tables({}),

@@ -104,6 +104,49 @@ def test_image_loading_keeps_upper_8_of_16_bits_and_luma_of_colours(tmp_path: Pa
     assert np.all(np.abs(load_picture(tmp_path / "b.png").astype(int) - expected) <= 1)
 
 
+@pytest.mark.parametrize("bits", [8, 10, 12, 14, 16])
+def test_files_of_16_bits_give_the_upper_8_of_those_in_use(tmp_path: Path, bits: int) -> None:
+    wide = np.random.default_rng(2).integers(0, 1 << bits, (512, 1024), np.uint16)
+    for name in ("a.png", "a.tif"):
+        Image.fromarray(wide).save(tmp_path / name)
+        np.testing.assert_array_equal(load_picture(tmp_path / name), wide >> (bits - 8))
+
+
+@pytest.mark.parametrize("orientation", range(1, 9))
+def test_pictures_are_turned_as_their_exif_data_say(
+    tmp_path: Path, values: np.ndarray, orientation: int
+) -> None:
+    exif = Image.Exif()
+    exif[0x0112] = orientation
+    Image.fromarray(values).save(tmp_path / "a.png", exif=exif)
+    # EXIF 2.32, orientation: which sides of the scene are the file's first row and column.
+    upright = values.T if orientation > 4 else values
+    down, along = {2: (1, -1), 3: (-1, -1), 4: (-1, 1), 6: (1, -1), 7: (-1, -1), 8: (-1, 1)}.get(
+        orientation, (1, 1)
+    )
+    np.testing.assert_array_equal(load_picture(tmp_path / "a.png"), upright[::down, ::along])
+
+
+@pytest.mark.parametrize("top_down", [False, True])
+def test_fits_images_load_with_their_upper_row_first(
+    tmp_path: Path, values: np.ndarray, top_down: bool
+) -> None:
+    fits = pytest.importorskip("astropy.io.fits")
+    image = fits.PrimaryHDU((values.astype(np.uint16) << 4)[::-1])
+    if top_down:
+        image.data = image.data[::-1]
+        image.header["ROWORDER"] = "TOP-DOWN"
+    image.writeto(tmp_path / "a.fits")
+    np.testing.assert_array_equal(load_picture(tmp_path / "a.fits"), values)
+
+
+def test_rejects_damaged_fits_images(tmp_path: Path) -> None:
+    pytest.importorskip("astropy.io.fits")
+    (tmp_path / "a.fits").write_bytes(b"SIMPLE  =                    T" + b" " * 99)
+    with pytest.raises(SceneError, match=r"^a\.fits (can not be read|has no image)"):
+        load_picture(tmp_path / "a.fits")
+
+
 def test_rejects_crops_outside_the_image(tmp_path: Path) -> None:
     Image.new("L", (1024, 600)).save(tmp_path / "small.png")
     message = "small.png is 1024 x 600 pixels; with crop 0,100 it must be at least 1024 x 612"
