@@ -45,6 +45,13 @@ MOST_STARS = 6000
 
 SAME_FIELD_DEG = 1e-3
 
+CROWDED_DEG = (8.0, 17.9)
+"""Fields with more triangles than the flash holds (8 MB), if all sides up to the field counted."""
+
+CROWDED_SIDE = 0.86
+"""Longest side that their triangles have, as a part of the field: chosen, the largest database (13
+deg) then just fits."""
+
 ADVICE = "change fov_deg, stars_per_field, longest_side_deg or mag_limit"
 
 
@@ -132,7 +139,11 @@ def build_database(
 def onboard_database(field_deg: float = FOV_DEG, progress: Progress = _silent) -> Database:
     """The onboard catalogue for a lens with this field of view; the latest two are cached."""
     usual = abs(field_deg - FOV_DEG) < SAME_FIELD_DEG
-    parameters = CatalogueParameters(fov_deg=FOV_DEG if usual else field_deg)
+    crowded = CROWDED_DEG[0] < field_deg < CROWDED_DEG[1]
+    parameters = CatalogueParameters(
+        fov_deg=FOV_DEG if usual else field_deg,
+        longest_side_deg=CROWDED_SIDE * field_deg if crowded else None,
+    )
     if parameters not in _kept:
         built = cached_database(parameters, progress)
         while len(_kept) > 1:
