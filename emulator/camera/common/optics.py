@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cubestack.emulator.camera.common.hazards.contract import Lens
-from cubestack.emulator.camera.common.residual import Residual, displace, restore
+from cubestack.emulator.camera.common.residual import Displacement, displace, restore
 from cubestack.emulator.scene.file import SceneError
 from cubestack.firmware_model.values import (
     REQUIRED,
@@ -83,7 +83,7 @@ class Optics(DeclaredValues):
     field_stop_deg: float = positive(
         360.0, "diameter of the round field behind a shade; 360: no shade"
     )
-    residuals: tuple[Residual, ...] = ()
+    residuals: tuple[Displacement, ...] = ()
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -101,8 +101,14 @@ class Optics(DeclaredValues):
     def basics(self) -> Lens:
         """The part of it that hazards can change."""
         f_number = self.focal_length_mm / self.aperture_mm
-        shape = self.rows, self.columns
-        return Lens(f_number, self.pixel_pitch_um, shape, self.psf_sigma_px, 1.0, self.residuals)
+        return Lens(
+            f_number,
+            self.pixel_pitch_um,
+            (self.rows, self.columns),
+            (self.cx, self.cy),
+            self.psf_sigma_px,
+            residuals=self.residuals,
+        )
 
     def changed(self, lens: Lens) -> "Optics":
         """These optics with the values of ``lens``; the same object if none differs."""

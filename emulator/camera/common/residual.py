@@ -1,6 +1,7 @@
 """Errors of a lens that its calibration does not contain: a smooth displacement of the image."""
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,13 @@ Coefficients = tuple[tuple[float, ...], ...]
 
 _INVERSION_STEPS = 50
 _INVERSION_PX = 1e-11
+
+
+class Displacement(Protocol):
+    """A displacement of the picture."""
+
+    def at(self, pixels: Pixels) -> Pixels:
+        """Displacement (n, 2) at the image points ``pixels`` (n, 2), px."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +36,38 @@ class Residual:
         return np.stack([_horner(x, y, self.across), _horner(x, y, self.down)], axis=1)
 
 
-def displace(pixels: Pixels, residuals: tuple[Residual, ...]) -> Pixels:
+@dataclass(frozen=True)
+class Warp:
+    """Displacement that is linear, and cubic in the radius, about a point of the picture."""
+
+    middle: tuple[float, float]  # column and row, px
+    #: displacement in px per px: of the column by column and row, then of the row
+    linear: tuple[tuple[float, float], tuple[float, float]] = ((0, 0), (0, 0))
+    cubic: float = 0.0  # displacement away from the point, px per px^3
+
+    def at(self, pixels: Pixels) -> Pixels:
+        """Displacement (n, 2) at the image points ``pixels`` (n, 2)."""
+        offset = pixels - self.middle
+        radius2 = np.sum(offset * offset, axis=1, keepdims=True)
+        return np.asarray(offset @ np.array(self.linear).T + self.cubic * radius2 * offset)
+
+
+@dataclass(frozen=True)
+class Swing:
+    """Rows that swing to and fro, as of a camera that shakes while its rows are read in turn."""
+
+    px: float  # largest displacement
+    direction: float  # of the swing, rad from the row's direction
+    rows: float  # of one swing
+    phase: float  # at row 0, rad
+
+    def at(self, pixels: Pixels) -> Pixels:
+        """Displacement (n, 2) at the image points ``pixels`` (n, 2)."""
+        swing = self.px * np.sin(2 * np.pi * pixels[:, 1] / self.rows + self.phase)
+        return np.outer(swing, (np.cos(self.direction), np.sin(self.direction)))
+
+
+def displace(pixels: Pixels, residuals: tuple[Displacement, ...]) -> Pixels:
     """Image points (n, 2) of the ideal points ``pixels``, to 1e-11 px for smooth residuals.
 
     NaN stays NaN.
@@ -43,7 +82,7 @@ def displace(pixels: Pixels, residuals: tuple[Residual, ...]) -> Pixels:
     return pixels
 
 
-def restore(pixels: Pixels, residuals: tuple[Residual, ...]) -> Pixels:
+def restore(pixels: Pixels, residuals: tuple[Displacement, ...]) -> Pixels:
     """Inverse of `displace`, and the faster of the two: for all pixels of an image."""
     for residual in reversed(residuals):
         pixels = pixels - residual.at(pixels)

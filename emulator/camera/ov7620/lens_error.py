@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cubestack.emulator.camera.common.residual import Residual
+from cubestack.emulator.camera.common.residual import Displacement
 from cubestack.emulator.scene.earth_sun import CameraTarget
 from cubestack.emulator.scene.file import SceneError
 from cubestack.firmware_model.values import REQUIRED, DeclaredValues, many, number, vector
@@ -69,7 +69,7 @@ class LensError(DeclaredValues):
     )
     decentring_deg: tuple[float, float] = vector(2, (0.0, 0.0), "Brown's p1 and p2")
     scale: float = number(1.0, "of the picture about the optical axis", 0.85, 1.15)
-    residuals: tuple[Residual, ...] = ()
+    residuals: tuple[Displacement, ...] = ()
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -15,7 +15,7 @@ from cubestack.firmware_model.values import DeclaredValues, flag, number, positi
 MOST_STUCK = ROWS * COLUMNS // 4
 """Largest number of single pixels and pairs, so that each finds a place."""
 
-IN_FOCUS = Lens(F_NUMBER, PITCH_UM, (ROWS, COLUMNS), SPOT_PX)
+IN_FOCUS = Lens(F_NUMBER, PITCH_UM, (ROWS, COLUMNS), ((COLUMNS - 1) / 2, (ROWS - 1) / 2), SPOT_PX)
 """The part of the lens that hazards can change."""
 
 

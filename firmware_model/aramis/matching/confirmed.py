@@ -17,6 +17,7 @@ from cubestack.firmware_model.aramis.matching.shutter import FEWEST, at_middle_r
 from cubestack.firmware_model.aramis.matching.triple_triangles import TripleTriangles
 from cubestack.firmware_model.aramis.solution import NONE, Profile, Solution, StarList, unsolved
 from cubestack.firmware_model.attitude.geometry import scaled, turned
+from cubestack.firmware_model.attitude.lens_doubt import judge_lens
 from cubestack.firmware_model.attitude.quest import AttitudeError
 from cubestack.firmware_model.attitude.robust_fit import robust_fit
 from cubestack.firmware_model.interface.aramis import MeasurementOutcome, Reason
@@ -97,7 +98,8 @@ def _solution(
     expected = found.expected
     sigmas = np.sqrt(sigma_px[named] ** 2 + FLOOR_PX**2) * np.float32(field.scale[1])
     meter.charge(f32_mul=2 * len(named), f32_add=len(named), f32_sqrt=len(named))
-    placed = _at_middle_row(found, sigmas, measured, picture, field, profile)
+    as_seen = picture.directions[named]
+    placed = _at_middle_row(found, as_seen, sigmas, measured, picture, field, profile)
     if placed is None:
         return unsolved(Reason.SMEAR, measured, expected=expected)
     vectors, sigmas = placed
@@ -113,9 +115,23 @@ def _solution(
         )
     except AttitudeError:
         return unsolved(Reason.UNCONFIRMED, measured, expected=expected)
-    rating = Rating.of(fit, found.false_alarm, meter)
-    if rating.sigma_rad[2] > profile.largest_sigma_rad:
+    if fit.covariance[2, 2] > profile.largest_sigma_rad**2:
         return unsolved(Reason.UNCONFIRMED, measured, expected=expected)
+    if vectors is as_seen:  # else their motion explains residuals
+        lens = judge_lens(
+            measured.centroids[named],
+            picture.stars.vectors[found.stars],
+            sigmas,
+            lambda pixels: field.directions(pixels, meter),
+            field.centre,
+            fit,
+            meter,
+            profile.lens_doubt,
+        )
+        if lens.is_refused:
+            return unsolved(Reason.LENS, measured, expected=expected)
+        fit = replace(fit, quaternion=lens.quaternion, covariance=lens.covariance)
+    rating = Rating.of(fit, found.false_alarm, meter)
     stars = np.full(len(measured), NONE, dtype=np.int32)
     stars[named] = found.stars
     return Solution(
@@ -132,16 +148,16 @@ def _solution(
 
 def _at_middle_row(
     found: Candidate,
+    vectors: Floats,
     sigmas: Floats,
     measured: StarList,
     picture: Observation,
     field: CameraField,
     profile: Profile,
 ) -> tuple[Floats, Floats] | None:
-    """Directions (k, 3) of the stars at one instant and their errors (k,) in rad, ``sigmas`` where
-    they did not move; None where the turn about the boresight is too uncertain."""
+    """Directions (k, 3) of the stars at one instant and their errors (k,) in rad, ``vectors`` and
+    ``sigmas`` where they did not move; None where the turn about the boresight is too uncertain."""
     named, meter = found.centroids, picture.meter
-    vectors = picture.directions[named]
     still = measured.smear_px <= profile.smear_px or measured.skew_px <= 0
     if still or len(named) < FEWEST:
         return vectors, sigmas

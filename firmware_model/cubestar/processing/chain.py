@@ -210,10 +210,15 @@ class Processing:
         attitude = Attitude(
             found.quaternion, results.frame, results.image_ms, found.stars, results.mode, stored
         )
-        believed = self.transitions.believes(attitude, identification.false_alarm)
+        believed = not found.is_refused and self.transitions.believes(
+            attitude, identification.false_alarm
+        )
         self._record("attitude", (yield from phases.end(self.state, "attitude_us", started_us)))
         if found.rating is not None:
             reason = Reason.SOLVED if believed else Reason.CONTRADICTION
+            if found.is_refused:
+                reason = Reason.LENS
+                self.transitions.failed(results.mode)
             self.state.quality = estimate.rated(results, identification, found.rating, reason)
         if not believed:
             return self._fail(TaskStatus.CALCULATION_FAILED, "IDError")

@@ -9,12 +9,18 @@ Telemetry Quality rates it, or says why there is none. What disturbs the picture
 are chosen well above those of an undisturbed sky.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.attitude.geometry import CameraParameters, scaled
+from cubestack.firmware_model.attitude.geometry import (
+    CameraParameters,
+    scaled,
+    undistort,
+    unit_vectors,
+)
+from cubestack.firmware_model.attitude.lens_doubt import judge_lens
 from cubestack.firmware_model.attitude.quest import quest
 from cubestack.firmware_model.attitude.robust_fit import robust_fit
 from cubestack.firmware_model.cubestar.detection.contract import PictureStatistics
@@ -45,6 +51,7 @@ class Estimate:
     quaternion: NDArray[np.float32]
     stars: int
     rating: Rating | None
+    is_refused: bool = False  #: the lens is not as described, and the attitude too uncertain
 
 
 def by_votes(
@@ -65,20 +72,28 @@ def by_errors(
     camera: CameraParameters,
     meter: Meter,
 ) -> Estimate:
-    """Weighted with inverse variances, displaced stars less, and rated. Raises AttitudeError."""
-    kept = identification.matched
+    """Weighted with inverse variances, displaced stars less, rated, and with the lens that the
+    stars support. Raises AttitudeError."""
+    kept, detection = identification.matched, results.detection
     scale = identification.scale if abs(identification.scale - 1) > SCALED else 1.0
-    fit = robust_fit(
-        results.vectors[kept],
-        vectors[identification.stars[kept]],
-        _sigmas(results, kept, camera, meter),
-        meter,
-        scale=scale,
-        excess=EXCESS,
-    )
+    inertial, sigmas = vectors[identification.stars[kept]], _sigmas(results, kept, camera, meter)
+    fit = robust_fit(results.vectors[kept], inertial, sigmas, meter, scale=scale, excess=EXCESS)
     meter.charge(flash_read=3 * len(kept))
+    refused = False
+    if detection is not None:
+        lens = judge_lens(
+            detection.centroids[kept],
+            inertial,
+            sigmas,
+            lambda pixels: unit_vectors(undistort(pixels, camera, meter), camera, meter),
+            (camera.cx, camera.cy),
+            fit,
+            meter,
+        )
+        refused = lens.is_refused
+        fit = replace(fit, quaternion=lens.quaternion, covariance=lens.covariance)
     rating = Rating.of(fit, identification.false_alarm, meter)
-    return Estimate(fit.quaternion, len(kept), rating)
+    return Estimate(fit.quaternion, len(kept), rating, refused)
 
 
 def _sigmas(

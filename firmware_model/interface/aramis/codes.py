@@ -34,7 +34,7 @@ class MeasurementOutcome(IntEnum):
 
 
 class Reason(IntEnum):
-    """Why a measurement ended as it did; from 16 on there was no image or no catalogue."""
+    """Why a measurement ended as it did; 16 to 22: there was no image or no catalogue."""
 
     NOT_MEASURED = 0
     UNIQUE = 1  #: one triangle of the catalogue remained
@@ -59,6 +59,7 @@ class Reason(IntEnum):
     CAMERA_FRAME = 20  #: the frame was shorter, or its lines longer or shorter, than programmed
     NO_CATALOGUE = 21  #: the flash holds none
     CATALOGUE_DAMAGED = 22  #: more bits were wrong than can be corrected
+    LENS = 23  #: the stars do not fit the lens as described
 
 
 class CatalogueState(IntEnum):

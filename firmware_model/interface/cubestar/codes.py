@@ -136,3 +136,4 @@ class Reason(IntEnum):
     MIRRORED = 10
     NO_TIME = 11
     CONTRADICTION = 12
+    LENS = 13  #: the stars do not fit the lens as described

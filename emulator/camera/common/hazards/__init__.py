@@ -2,7 +2,16 @@
 
 from cubestack.emulator.camera.common.hazards.contract import SensorHazard
 from cubestack.emulator.camera.common.hazards.dose import Dose
-from cubestack.emulator.camera.common.hazards.lenses import Defocus, FocalLength, LensResiduals
+from cubestack.emulator.camera.common.hazards.lenses import (
+    Defocus,
+    FocalLength,
+    LensResiduals,
+    PixelAspect,
+    PixelSkew,
+    PrincipalPoint,
+    RadialDistortion,
+    Wobble,
+)
 from cubestack.emulator.camera.common.hazards.pixels import HotPixels, Response
 from cubestack.emulator.camera.common.hazards.protons import Protons
 from cubestack.emulator.camera.common.hazards.veils import Background, Gradient
@@ -17,6 +26,11 @@ HAZARDS: dict[str, type[SensorHazard]] = {
         Defocus,
         FocalLength,
         LensResiduals,
+        PixelAspect,
+        PixelSkew,
+        PrincipalPoint,
+        RadialDistortion,
+        Wobble,
         Gradient,
         Background,
     )

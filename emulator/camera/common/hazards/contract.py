@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.emulator.camera.common.residual import Residual
+from cubestack.emulator.camera.common.residual import Displacement
 from cubestack.emulator.scene.hazards.hazard import Hazard
 
 Field = NDArray[np.float32]
@@ -36,9 +36,10 @@ class Lens:
     f_number: float  # focal length divided by aperture
     pitch_um: float  # pixel pitch of the sensor
     shape: tuple[int, int]  # rows and columns of the sensor
+    middle: tuple[float, float]  # principal point: column and row, px
     spot_px: float  # standard deviation of a point's image
     scale: float = 1.0  # focal length relative to its nominal value
-    residuals: tuple[Residual, ...] = ()  # displacements of the image
+    residuals: tuple[Displacement, ...] = ()  # displacements of the image
 
 
 @dataclass(frozen=True, kw_only=True)

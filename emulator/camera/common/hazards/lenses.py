@@ -8,7 +8,7 @@ import numpy as np
 from numpy.polynomial.legendre import leg2poly
 
 from cubestack.emulator.camera.common.hazards.contract import Lens, SensorHazard
-from cubestack.emulator.camera.common.residual import Residual
+from cubestack.emulator.camera.common.residual import Displacement, Residual, Swing, Warp
 from cubestack.emulator.scene.hazards.hazard import Strength
 from cubestack.firmware_model.values import number
 
@@ -89,3 +89,100 @@ class LensResiduals(SensorHazard):
         powers = np.array([np.pad(leg2poly(row), (0, size))[:size] for row in np.eye(size)]).T
         across, down = (tuple(map(tuple, (powers @ c @ powers.T).tolist())) for c in coefficients)
         return replace(lens, residuals=(*lens.residuals, Residual(lens.shape, across, down)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Misdescribed(SensorHazard):
+    """A lens whose camera file is wrong in one respect."""
+
+    @classmethod
+    def sample(cls, strength: float, state: Any, generator: np.random.Generator) -> Self:
+        one = super().sample(strength, state, generator)
+        return replace(one, **{cls.strength.key: strength * float(generator.choice([-1, 1]))})
+
+    def displacement(self, lens: Lens) -> Displacement:
+        """What it does to the picture."""
+        raise NotImplementedError
+
+    def lens(self, lens: Lens, temperature_c: float) -> Lens:
+        del temperature_c
+        if getattr(self, self.strength.key) == 0:
+            return lens
+        return replace(lens, residuals=(*lens.residuals, self.displacement(lens)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class PixelAspect(_Misdescribed):
+    """Pixels that are wider than high, where the camera file has square ones: fx is not fy."""
+
+    meaning = "pixels wider than high, or fx and fy that differ"
+    strength = Strength("percent", "%", (0, 0.5, 1, 2, 5), 2)
+
+    percent: float = number(0.0, "width of the picture beyond its calibration, per cent", -10, 10)
+
+    def displacement(self, lens: Lens) -> Displacement:
+        wider = self.percent / 100
+        return Warp(lens.middle, ((wider / (1 + wider), 0.0), (0.0, 0.0)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class PixelSkew(_Misdescribed):
+    """Rows and columns that are not square to each other."""
+
+    meaning = "rows and columns that are not at right angles"
+    strength = Strength("percent", "%", (0, 0.5, 1, 2, 5), 2)
+
+    percent: float = number(0.0, "shift of a row per row, per cent", -10, 10)
+
+    def displacement(self, lens: Lens) -> Displacement:
+        return Warp(lens.middle, ((0.0, self.percent / 100), (0.0, 0.0)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class PrincipalPoint(_Misdescribed):
+    """A lens beside its calibrated place: the picture is shifted, with its distortion."""
+
+    meaning = "a lens beside its calibrated place"
+    strength = Strength("px", "px", (0, 5, 10, 20, 40), 10)
+
+    px: float = number(0.0, "shift of the picture", -100, 100)
+    direction_deg: float = number(0.0, "of the shift, from the row's direction", -360, 360)
+
+    @classmethod
+    def sample(cls, strength: float, state: Any, generator: np.random.Generator) -> Self:
+        one = super().sample(strength, state, generator)
+        return replace(one, direction_deg=360 * float(generator.random()))
+
+    def displacement(self, lens: Lens) -> Displacement:
+        angle = math.radians(self.direction_deg)
+        across, down = self.px * math.cos(angle), self.px * math.sin(angle)
+        return Residual(lens.shape, ((across,),), ((down,),))
+
+
+@dataclass(frozen=True, kw_only=True)
+class RadialDistortion(_Misdescribed):
+    """A pincushion, or for negative values a barrel, that the calibration lacks."""
+
+    meaning = "distortion towards the corners that the calibration lacks"
+    strength = Strength("px", "px", (0, 2, 5, 10, 20), 5)
+
+    px: float = number(0.0, "displacement at half a diagonal from the principal point", -100, 100)
+
+    def displacement(self, lens: Lens) -> Displacement:
+        rows, columns = lens.shape
+        return Warp(lens.middle, cubic=self.px / math.hypot(rows / 2, columns / 2) ** 3)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wobble(_Misdescribed):
+    """A camera that shakes while its rows are read in turn: each row has its own displacement."""
+
+    meaning = "rows that swing while they are read in turn"
+    strength = Strength("px", "px", (0, 0.5, 1, 2, 3), 3)
+
+    px: float = number(0.0, "largest displacement", -20, 20)
+    swings: float = number(1.5, "during the read-out", 0.1, 20)
+
+    def displacement(self, lens: Lens) -> Displacement:
+        direction, phase = np.random.default_rng([self.seed, 0x30B]).uniform(0, 2 * np.pi, 2)
+        return Swing(self.px, float(direction), lens.shape[0] / self.swings, float(phase))

@@ -15,7 +15,7 @@ from cubestack.firmware_model.aramis.matching import confirmed
 from cubestack.firmware_model.aramis.matching.identification import identify
 from cubestack.firmware_model.aramis.matching.shutter import FEWEST, at_middle_row
 from cubestack.firmware_model.aramis.pipeline import VERIFIED
-from cubestack.firmware_model.aramis.solution import Solution, StarList
+from cubestack.firmware_model.aramis.solution import Profile, Solution, StarList
 from cubestack.firmware_model.attitude.quest import AttitudeError
 from cubestack.firmware_model.interface.aramis import MeasurementOutcome, Reason
 
@@ -24,17 +24,20 @@ from ..sky import FIELD, Light, Picture, database, errors_deg, meter, picture, p
 PROFILE = VERIFIED.profile
 
 
-def found(made: Picture, stars: StarList | None = None, noise_px: float = 0.1) -> Solution:
+def found(
+    made: Picture, stars: StarList | None = None, noise_px: float = 0.1, profile: Profile = PROFILE
+) -> Solution:
     stars = stars or made.stars
     sigma = np.full(len(stars), noise_px, np.float32)
-    return identify(replace(stars, sigma_px=sigma), FIELD, PROFILE, database(), meter())
+    return identify(replace(stars, sigma_px=sigma), FIELD, profile, database(), meter())
 
 
 @pytest.mark.parametrize("noise_px", [0.05, 0.2, 0.5])
 def test_confirmed_attitude_errors_match_the_reported_sigma(noise_px: float) -> None:
-    inside = []
+    """Without doubt about the lens, which would add an error that an exact lens does not have."""
+    inside, sure = [], replace(PROFILE, lens_doubt=0.0)
     for made in pictures(60, 7, Light(noise_px=noise_px)):
-        solution = found(made, noise_px=noise_px)
+        solution = found(made, noise_px=noise_px, profile=sure)
         if solution.quaternion is None:
             continue
         assert solution.rating is not None
@@ -42,6 +45,15 @@ def test_confirmed_attitude_errors_match_the_reported_sigma(noise_px: float) -> 
         inside.append(np.abs(turn.as_rotvec()) < solution.rating.sigma_rad)
     assert len(inside) > 50
     assert 0.55 < np.mean(inside) < 0.85
+
+
+def test_doubt_about_the_lens_widens_the_reported_sigma() -> None:
+    for made in pictures(5, 7):
+        sure = found(made, profile=replace(PROFILE, lens_doubt=0.0)).rating
+        doubting = found(made).rating
+        assert sure is not None
+        assert doubting is not None
+        assert np.all(doubting.sigma_rad[:2] > sure.sigma_rad[:2])
 
 
 def test_correct_focal_length_is_rarely_rescaled() -> None:

@@ -4,7 +4,16 @@ import numpy as np
 import pytest
 
 from cubestack.emulator.camera.common.hazards.contract import SensorHazard
-from cubestack.emulator.camera.common.hazards.lenses import Defocus, FocalLength, LensResiduals
+from cubestack.emulator.camera.common.hazards.lenses import (
+    Defocus,
+    FocalLength,
+    LensResiduals,
+    PixelAspect,
+    PixelSkew,
+    PrincipalPoint,
+    RadialDistortion,
+    Wobble,
+)
 from cubestack.emulator.camera.common.optics import Optics
 from cubestack.emulator.camera.common.residual import displace
 from cubestack.emulator.camera.common.view import SkyCondition
@@ -70,6 +79,36 @@ def test_lens_residuals_have_their_rms_without_rotation_or_scale(seed: int) -> N
     plane = np.column_stack([pixels, np.ones(len(pixels))])
     fitted = plane @ np.linalg.lstsq(plane, by, rcond=None)[0]
     assert np.abs(fitted).max() < 0.02
+
+
+@pytest.mark.parametrize("condition", [CONDITION, ARAMIS])
+def test_wrong_shapes_move_stars_by_their_definition(condition: SkyCondition) -> None:
+    own = condition.optics
+    middle = np.array([own.cx, own.cy])
+    stars, away = own.unproject(GRID), GRID - middle
+    half = np.hypot(own.columns, own.rows) / 2
+    for hazard, moved in (
+        (PixelAspect(percent=2.0), away * (0.02, 0)),
+        (PixelSkew(percent=1.0), None),
+        (PrincipalPoint(px=10.0, direction_deg=90.0), np.full_like(away, (0, 10))),
+        (RadialDistortion(px=5.0), None),
+    ):
+        seen = lens(hazard, condition=condition).project(stars)
+        if moved is None:  # given at the place that is seen
+            shifted = seen - middle
+            square = np.sum(shifted * shifted, axis=1, keepdims=True)
+            skew = np.stack([0.01 * shifted[:, 1], np.zeros(len(shifted))], axis=1)
+            radial = 5 * square * shifted / half**3
+            moved = skew if isinstance(hazard, PixelSkew) else radial
+        np.testing.assert_allclose(seen, GRID + moved, atol=1e-7)
+
+
+def test_wobble_moves_rows_alike_and_by_its_size_at_most() -> None:
+    shaken = lens(Wobble(px=3.0, seed=4))
+    by = shaken.project(LENS.unproject(GRID)) - GRID
+    assert 2.9 < np.hypot(*by.T).max() <= 3.0
+    restored = shaken.unproject(GRID + by)
+    np.testing.assert_allclose(restored, LENS.unproject(GRID), atol=1e-9)
 
 
 def test_residuals_can_be_undone() -> None:
