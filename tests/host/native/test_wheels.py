@@ -142,7 +142,8 @@ def test_devices_with_the_same_design_share_a_library() -> None:
     once = shipped.recipes([("cubestar", {})])
     again = shipped.recipes([("cubestar", {}), ("cubestar", {"profile": "extended"})])
     assert [one.inputs for one in once] == [one.inputs for one in again]
-    assert [one.title for one in once] == ["the FPGA design CubeStarTop"]
+    titles = [one.title for one in once if not one.title.startswith("the inner loops")]
+    assert titles == ["the FPGA design CubeStarTop"]
 
 
 @pytest.fixture
