@@ -15,7 +15,7 @@ Times are rounded down to 1 ns.
 import heapq
 from collections.abc import Callable, Iterable, Mapping
 from itertools import count
-from typing import Any, Protocol
+from typing import IO, Any, cast, Protocol
 
 from vcd import VCDWriter
 
@@ -62,7 +62,8 @@ class VcdTrace:
         self._kernel = kernel
         self._engine = engine
         self._device = device
-        self._writer = VCDWriter(stream, timescale="1 ns", version="cubestack", date="")
+        file = cast("IO[str]", stream)  # of which the writer only calls write and flush
+        self._writer = VCDWriter(file, timescale="1 ns", version="cubestack", date="")
         self._probes = probes
         self._history = history
         self._variables: dict[str, Any] = {}

@@ -91,7 +91,7 @@ class Recipe:
                 for path, mark in [split_mark(str(value))]
                 if path.name in self.setup.files
             }
-            given = {"seed": seed, "engine": engine, "baud": baud}
+            given: dict[str, Any] = {"seed": seed, "engine": engine, "baud": baud}
             made = power_up(self.device, self.scene, **given, **options | here)
         made.files = self.files
         made.chosen = {name: str(options.get(name, one)) for name, one in made.chosen.items()}
