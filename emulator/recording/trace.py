@@ -15,7 +15,7 @@ Times are rounded down to 1 ns.
 import heapq
 from collections.abc import Callable, Iterable, Mapping
 from itertools import count
-from typing import IO, Any, cast, Protocol
+from typing import IO, Any, Protocol, cast
 
 from vcd import VCDWriter
 
