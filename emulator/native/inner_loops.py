@@ -19,7 +19,7 @@ Neither errno nor traps are used, so that loops with roots and conditions run in
 def inner_loops(title: str, sources: Iterable[Path]) -> ctypes.CDLL | None:
     """Library of the C++ files ``sources``, shipped, from the cache or compiled now.
 
-    ``title`` is a plural. None, with a warning, where there is neither a library nor a compiler.
+    None, with a warning, where there is neither a library nor a compiler.
     CompilerError when the compiler fails.
     """
     files = sorted(sources)
@@ -27,7 +27,8 @@ def inner_loops(title: str, sources: Iterable[Path]) -> ctypes.CDLL | None:
     try:
         return ctypes.CDLL(str(library_of(wanted)))
     except NoCompilerError as error:
-        warnings.warn(f"{error}; {title} run in Python, which takes longer", stacklevel=2)
+        # The text and the place are those of every such library, so that it is printed once.
+        warnings.warn(f"{error}; inner loops run in Python, which takes longer", stacklevel=1)
         return None
 
 

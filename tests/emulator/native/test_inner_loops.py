@@ -45,7 +45,7 @@ def test_without_compiler_one_line_says_that_python_runs(
     source: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(compiler, "find_compiler", lambda: None)
-    line = "^no C.. compiler found .*; the inner loops of the firmware run in Python"
+    line = "^no C.. compiler found .*; inner loops run in Python"
     with python_form(), pytest.warns(UserWarning, match=line) as said:
         offer_firmware_loops()
     assert len(said) == 1

@@ -42,7 +42,11 @@ def test_missing_compiler_prints_what_to_install(tmp_path: Path, quiet: tuple[st
         if quiet
         else [
             "cubestack shell: no C++ compiler found (install g++ or clang++, or run: pip install "
-            "ziglang); using the Amaranth simulator, about a thousand times slower"
+            f"ziglang); {what}"
+            for what in (
+                "using the Amaranth simulator, about a thousand times slower",
+                "inner loops run in Python, which takes longer",
+            )
         ]
     )
 
