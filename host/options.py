@@ -20,10 +20,13 @@ PATH = ValueKind("path", "a path", Path, Path)
 FILE = ValueKind("file", "a file", _file, Path)
 """The path of a file, or what a program made instead of it: a scene, a plan of faults."""
 
+OUTPUT = ValueKind("output", "a file to write", Path, Path)
+
 SWITCH = replace(FLAG, read={False: False, True: True}.__getitem__)  # 0 and 1 too
 
 # Each takes (default, meaning), then keywords of `Declaration`.
 path_option: Callable[..., Any] = partial(declare, PATH, metavar="FILE")
+output_option: Callable[..., Any] = partial(declare, OUTPUT, metavar="FILE")
 file_option: Callable[..., Any] = partial(declare, FILE, metavar="FILE")
 corner: Callable[..., Any] = partial(vector, 2, kind=whole, metavar="X,Y")
 switch: Callable[..., Any] = partial(declare, SWITCH, False)

@@ -15,7 +15,7 @@ test prints the fault events.
 """
 
 from argparse import ArgumentTypeError
-from contextlib import ExitStack, nullcontext
+from contextlib import nullcontext
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -26,6 +26,7 @@ from cubestack.firmware_model.interface.codec.switches import DEFAULT_PROFILE, P
 from cubestack.host.devices.device import ENGINE_FORM, Engine, engine_name
 from cubestack.host.devices.registry import devices, emulated_names
 from cubestack.host.emulation.virtual_clock import VirtualClock
+from cubestack.host.output import Outputs
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator
@@ -84,7 +85,7 @@ class _Coverage:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self._stack = ExitStack()
+        self._stack = Outputs()
         self._watch: Callable[[AnyEmulated], None] | None = None
 
     def watch(self, opened: "AnyEmulated") -> None:

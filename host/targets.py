@@ -36,6 +36,7 @@ from cubestack.host.emulation.emulated import node_client, open_device
 from cubestack.host.emulation.records import create_record, start_recorder
 from cubestack.host.emulation.remote_controls import controlled
 from cubestack.host.errors import NodeError, PortOpenError, TargetError
+from cubestack.host.output import Outputs
 from cubestack.host.recording.host_recorder import HostRecorder
 from cubestack.host.recording.playback import RecordedI2c, RecordedTransport
 from cubestack.host.recording.setups import emulated_setup, taped_setup
@@ -130,10 +131,11 @@ def open_target(
     given = {"scene": scene is not None, "engine": engine != "auto"}
     for name in (*(name for name, here in given.items() if here), *(options or {})):
         raise TargetError(f"--{name} is for emulated:DEVICE, not for {text}")
-    with ExitStack() as stack:
+    with Outputs() as stack:
         tape = None
         if record is not None:
             tape = HostRecorder(create_record(record, stack), taped_setup(text))
+            stack.callback(tape.close)
         if text.startswith(RECORDED):
             target = _open_recorded(text)
         else:
@@ -141,6 +143,7 @@ def open_target(
             owner = device if controls is None else controls.device
             target = _open_real(text, owner, service_port, backup, baud, tape)
             target.controls, target.recorded = controls, record
+        stack.keep()
         target.on_close.insert(0, stack.pop_all().close)
         return target
 
@@ -160,13 +163,14 @@ def _open_emulated(
         raise TargetError(f"no device {name!r} can be emulated; known: {known}")
     emulated = open_device(name, scene, seed=seed, baud=baud, engine=engine, **options)
     board, interface = emulated.board, emulated.device.interface
-    with ExitStack() as stack:
+    with Outputs() as stack:
         stack.callback(emulated.close)
         controls = EmulatedControls(emulated)
         if record is not None:
             setup = emulated_setup(seed, scene, options=options)
             recorder = start_recorder(emulated, create_record(record, stack), setup)
             stack.callback(recorder.close)
+            stack.keep()
         lines = [board.serial(line.name) for line in board.lines]
         bus = board.i2c()
         has_node = board.lines[0].has_node

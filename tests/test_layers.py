@@ -49,6 +49,7 @@ ORDER = {
     ),
     "host": (
         "errors options terminal",
+        "output",
         "transport export calibration",
         "clients",
         "recording pictures",

@@ -53,9 +53,10 @@ class Recorder:
         self._writer.flush()
 
     def close(self) -> None:
-        """Write pending bytes and detach; the stream stays open."""
+        """Write pending bytes and the end, and detach; the stream stays open."""
         for tap in self._taps:
             tap.close()
+        self._writer.end()
 
 
 class _LineTap(UartTap):

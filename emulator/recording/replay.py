@@ -2,7 +2,7 @@
 
 The board must be configured and powered up like the recorded one. It receives the host's bytes at
 the same virtual times, and the recorded commands from outside of its ports. The same byte at
-another time counts as a difference.
+another time counts as a difference. What follows the end of a recording that was cut off does not.
 """
 
 from collections.abc import Callable, Generator, Mapping, Sequence
@@ -116,10 +116,12 @@ class Replay:
 
     def _compare_line(self, interface: Interface, port: str, heard: "_Listener") -> str | None:
         expected, times = self._recording.sent(port, "device")
-        if (index := _first_difference(expected, heard.data)) is not None:
-            what = _bytes(expected, heard.data, index)
-        elif (index := _first_difference(times, heard.times)) is not None:
-            what = f"same bytes, {(heard.times[index] - times[index]) / 1e6:+.3f} us in time"
+        end = None if self._recording.whole else len(expected)
+        found, found_times = heard.data[:end], heard.times[:end]
+        if (index := _first_difference(expected, found)) is not None:
+            what = _bytes(expected, found, index)
+        elif (index := _first_difference(times, found_times)) is not None:
+            what = f"same bytes, {(found_times[index] - times[index]) / 1e6:+.3f} us in time"
         else:
             return None
         return f"{name_answer_byte(interface, self._recording, port, index)}: {what}"

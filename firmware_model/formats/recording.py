@@ -1,8 +1,9 @@
 """Recordings of a device's ports, as lines of JSON; docs/reference/recording-format.md for users.
 
-The first line is the header: ``{"recording": 1, "device": ..., "lines": {port: baud}, "setup"}``;
-the optional last member is that of ``Setup.to_json``. Each further line is one event, in any order;
-"ps" is virtual time:
+The first line is the header: ``{"recording": 2, "device": ..., "lines": {port: baud}, "setup"}``;
+the optional last member is that of ``Setup.to_json``. The last line is ``{"events": count}``.
+Without it the recording was cut off, and its last event may be torn. Each line between is an event,
+in any order; "ps" is virtual time:
 
 - ``{"ps", "port", "from": "host" or "device", "data": hex, "byte_ps"}``: bytes on a serial line.
   The first one begins at "ps", each next one "byte_ps" later; both are times on the wire.
@@ -13,7 +14,7 @@ the optional last member is that of ``Setup.to_json``. Each further line is one 
   a port, as a shell command; "text" is the content of a file that the command names, "files" that
   of files that the text names, in base 64 by the last part of their path.
 
-A last line that is cut off is ignored.
+Version 1 had no last line.
 """
 
 import json
@@ -24,8 +25,11 @@ from typing import Any, Literal, Protocol
 
 from cubestack.firmware_model.formats import untrusted
 from cubestack.firmware_model.formats.setup import Setup, files_json, files_of
+from cubestack.firmware_model.formats.versions import check_version
 
-VERSION = 1
+VERSION = 2
+READABLE = (1, 2)
+"""Versions that ``load_recording`` reads."""
 
 LARGEST = 4 << 30
 """Bytes of a recording."""
@@ -110,6 +114,7 @@ class Recording:
     bauds: dict[str, int] = field(default_factory=dict)  #: baud rate of each serial line, by port
     events: tuple[Event, ...] = ()  #: in the order of time
     setup: Setup | None = None  #: how the device was created; None if not recorded
+    whole: bool = True  #: whether it has its end
 
     def line(self, port: str) -> Iterator[LineBytes]:
         return (e for e in self.events if isinstance(e, LineBytes) and e.port == port)
@@ -155,11 +160,17 @@ class RecordingWriter:
     ) -> None:
         """Write the header to ``stream``, which the caller closes."""
         self._stream = stream
+        self._events = 0
         header: dict[str, object] = {"recording": VERSION, "device": device, "lines": bauds}
         self._line(header | ({} if setup is None else {"setup": setup.to_json()}))
 
     def write(self, event: Event) -> None:
         self._line(_to_json(event))
+        self._events += 1
+
+    def end(self) -> None:
+        """Mark the end; nothing may follow."""
+        self._line({"events": self._events})
 
     def flush(self) -> None:
         """Make all events visible to readers of the file."""
@@ -189,9 +200,13 @@ def _to_json(event: Event) -> dict[str, object]:
 
 
 def load_recording(path: Path) -> Recording:
-    """Read a recording; raises RecordingError, or OSError if the file cannot be read."""
+    """Read a recording; raises RecordingError, or OSError if the file cannot be read.
+
+    One that was cut off ends with its last whole event.
+    """
     header: Recording | None = None
     events: list[Event] = []
+    whole = False
     for number, line in untrusted.read_lines(path, LARGEST, RecordingError):
         try:
             try:
@@ -204,29 +219,37 @@ def load_recording(path: Path) -> Recording:
                 raise ValueError("a line must be an object")
             if header is None:
                 header = _header(path, content)
+                whole = header.whole
+            elif "events" in content:
+                _check_end(content["events"], len(events))
+                whole = True
             else:
                 events.append(_event(content, header.bauds))
         except (ValueError, KeyError) as error:
             reason = f"lacks {error}" if isinstance(error, KeyError) else str(error)
-            raise RecordingError(
-                f"{path} is no recording of version {VERSION}: line {number}: {reason}"
-            ) from None
+            raise RecordingError(f"{path} is no recording: line {number}: {reason}") from None
     if header is None:
         raise RecordingError(f"{path} is no recording: it is empty")
     ordered = tuple(sorted(events, key=lambda event: event.time_ps))
-    return replace(header, events=ordered)
+    return replace(header, events=ordered, whole=whole)
+
+
+def _check_end(count: object, found: int) -> None:
+    if count != found:
+        raise ValueError(f"it ends after {found} events, not {count}")
 
 
 def _header(path: Path, content: dict[str, Any]) -> Recording:
-    if content.get("recording") != VERSION:
+    if "recording" not in content:
         raise ValueError("there is no header")
+    found = check_version("recording", content["recording"], READABLE)
     lines = content["lines"]
     if not isinstance(content["device"], str) or not isinstance(lines, dict):
         raise ValueError('"device" must be a text and "lines" an object')
     for port in lines:
         _number(lines, port, 1, HIGHEST_BAUD)
     setup = Setup.from_json(content["setup"]) if "setup" in content else None
-    return Recording(str(path), content["device"], lines, setup=setup)
+    return Recording(str(path), content["device"], lines, setup=setup, whole=found == 1)
 
 
 def _number(content: dict[str, Any], name: str, low: int, high: int) -> int:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.formats.untrusted import read_json
 from cubestack.host.errors import CameraFileError
+from cubestack.host.output import write_output
 
 INVERSION_STEPS = 100
 INVERSION_TOLERANCE_PX = 1e-6
@@ -102,10 +103,5 @@ def load_camera(path: Path) -> Camera:
 
 
 def save_camera(camera: Camera, path: Path) -> None:
-    """Write a file for `load_camera`; raises CameraFileError (a ValueError) if it cannot."""
-    try:
-        path.write_text(json.dumps({"camera": asdict(camera)}, indent=2) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise CameraFileError(
-            f"{path}: {error.strerror}; choose a path that can be written"
-        ) from error
+    """Write a file for `load_camera`; raises ValueError if it cannot."""
+    write_output(path, json.dumps({"camera": asdict(camera)}, indent=2) + "\n")

@@ -10,7 +10,9 @@ from typing import Any, NoReturn, TypeVar
 
 from cubestack.firmware_model.formats.untrusted import shown
 from cubestack.firmware_model.values import FLAG, Declaration, ListDeclaration
-from cubestack.host.options import Options, option_string
+from cubestack.host.options import OUTPUT, Options, option_string
+
+FORCE = "--force"
 
 OptionsT = TypeVar("OptionsT", bound=Options)
 
@@ -62,6 +64,7 @@ class Parser(argparse.ArgumentParser):
             if owners := getattr(parsed, "others", {}).get(flag):
                 command.error(f"{flag} is an option of {', '.join(owners)}, not of this device")
             command.unknown(unknown)
+        parsed.own_parser._check_outputs(parsed)
         return parsed
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
@@ -92,6 +95,17 @@ class Parser(argparse.ArgumentParser):
             self._check_flags()  # it may be the value of a misspelt one
         few = f"one of {', '.join(choices)}, " if len(choices) <= MOST_LISTED or not hint else ""
         raise argparse.ArgumentError(action, f"must be {few}not {value!r}{hint}")
+
+    def _check_outputs(self, parsed: argparse.Namespace) -> None:
+        """Refuse to replace a file without ``--force``."""
+        for action in self._actions:
+            path, inside = getattr(parsed, action.dest, None), getattr(action, "inside", None)
+            if path is None or inside is None or parsed.force:
+                continue
+            place = path / inside
+            if place.is_file():
+                option = action.option_strings[0]
+                self.error(f"{option}: {place} exists; choose another, or replace it with {FORCE}")
 
     def format_help(self) -> str:
         """The help, with the address of the documents if it names one: they aren't installed."""
@@ -137,7 +151,9 @@ def add_value(parser: argparse._ActionsContainer, name: str, one: Any, **how: An
         how |= {"type": _read(part), "choices": part.choices or None, "metavar": metavar or None}
         if repeated:
             how |= {"action": "append", "default": []}
-    parser.add_argument(option_string(name), **how)
+    action = parser.add_argument(option_string(name), **how)
+    if part.kind.name == OUTPUT.name:
+        _declare_output(parser, action)
 
 
 def add_flag(parser: argparse._ActionsContainer, name: str, meaning: str) -> None:
@@ -148,6 +164,32 @@ def add_path(
     parser: argparse._ActionsContainer, name: str, meaning: str, metavar: str = "FILE"
 ) -> None:
     parser.add_argument(name, type=Path, metavar=metavar, help=meaning)
+
+
+def add_output(
+    parser: argparse._ActionsContainer,
+    name: str,
+    meaning: str,
+    metavar: str = "FILE",
+    *,
+    inside: str = "",
+    required: bool = False,
+) -> None:
+    """Declare an option that names a file to write, and ``--force`` to replace one that exists.
+
+    ``inside``: the option names a folder, in which this file is written.
+    """
+    action = parser.add_argument(name, type=Path, metavar=metavar, help=meaning, required=required)
+    _declare_output(parser, action, inside)
+
+
+def _declare_output(
+    parser: argparse._ActionsContainer, action: argparse.Action, inside: str = ""
+) -> None:
+    action.inside = inside  # type: ignore[attr-defined]
+    whole = getattr(parser, "_container", parser)
+    if FORCE not in whole._option_string_actions:
+        add_flag(whole, FORCE, "replace files that exist")
 
 
 def _read(one: Declaration) -> Callable[[str], Any]:

@@ -16,15 +16,16 @@ from pathlib import Path
 
 from cubestack.firmware_model.formats.recording import load_recording
 from cubestack.firmware_model.formats.untrusted import shown
-from cubestack.host.cli.arguments import add_flag, add_path
+from cubestack.host.cli.arguments import add_flag, add_output, add_path
 from cubestack.host.devices.registry import device
+from cubestack.host.output import write_output
 from cubestack.host.recording.transcript import TABLES, TranscriptEntry, transcript
 from cubestack.host.terminal import say
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_path(parser, "recording", "see docs/how-to/recording.md")
-    add_path(parser, "--out", "or FILE.parquet", "FILE.csv")
+    add_output(parser, "--out", "or FILE.parquet", "FILE.csv")
     add_flag(parser, "--json", "print one JSON object per message")
 
 
@@ -43,11 +44,7 @@ def _write(path: Path, messages: list[TranscriptEntry]) -> None:
     kind = path.suffix.removeprefix(".")
     if kind not in TABLES:
         raise ValueError(f"{path}: a table is .csv or .parquet, not {path.suffix}")
-    content = TABLES[kind](messages)
-    try:
-        path.write_bytes(content)
-    except OSError as error:
-        raise ValueError(f"can not write {path}: {error.strerror}") from None
+    write_output(path, TABLES[kind](messages))
 
 
 def _object(one: TranscriptEntry) -> dict[str, object]:

@@ -2,12 +2,11 @@
 
 import argparse
 from collections.abc import Callable, Iterable, Mapping
-from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cubestack.firmware_model.values import whole
-from cubestack.host.cli.arguments import add_flag, add_path, add_value
+from cubestack.host.cli.arguments import add_flag, add_output, add_path, add_value
 from cubestack.host.devices.device import (
     ENGINE_FORM,
     GATEWARE_OPTIONS,
@@ -27,6 +26,7 @@ from cubestack.host.emulation.records import (
 )
 from cubestack.host.emulation.remote_controls import TOKEN
 from cubestack.host.options import option_string
+from cubestack.host.output import Outputs
 from cubestack.host.targets import FORMS, Target, open_target
 from cubestack.host.terminal import busy, say
 
@@ -153,8 +153,10 @@ def inject_plan(
 
 def add_record_arguments(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("records")
-    add_path(group, "--record", "record every byte of all ports to FILE (docs/how-to/recording.md)")
-    add_path(
+    add_output(
+        group, "--record", "record every byte of all ports to FILE (docs/how-to/recording.md)"
+    )
+    add_output(
         group,
         "--trace",
         "write serial lines, buses, FPGA pins and firmware variables as a waveform",
@@ -176,12 +178,12 @@ def add_insight_arguments(parser: argparse.ArgumentParser) -> None:
         ),
     )
     add_flag(group, "--gdb-wait", "with --gdb: wait for gdb before the first instruction")
-    add_path(group, "--profile-out", "cycles by function and line of --firmware, for kcachegrind")
-    add_path(group, "--coverage-out", "executed lines of --firmware, as an lcov file")
+    add_output(group, "--profile-out", "cycles by function and line of --firmware, for kcachegrind")
+    add_output(group, "--coverage-out", "executed lines of --firmware, as an lcov file")
 
 
 def insight(
-    args: argparse.Namespace, stack: ExitStack
+    args: argparse.Namespace, stack: Outputs
 ) -> "Callable[[AnyEmulated], GdbEndpoint | None]":
     """What to do with each device that is powered up; ``stack`` writes the files in the end.
 
@@ -204,7 +206,7 @@ def insight(
 
 
 def record(
-    args: argparse.Namespace, emulated: AnyEmulated, stack: ExitStack, setup: "Setup | None" = None
+    args: argparse.Namespace, emulated: AnyEmulated, stack: Outputs, setup: "Setup | None" = None
 ) -> "Recorder | None":
     """Start the requested recording and trace before any port is opened; ``stack`` ends them.
 
@@ -240,7 +242,7 @@ def add_target_arguments(parser: argparse.ArgumentParser) -> None:
     add_value(parser, "seed", whole(0, "for an emulated device", 0))
     add_engine_arguments(parser)
     add_board_arguments(parser)
-    add_path(parser, "--record", "record the session to FILE")
+    add_output(parser, "--record", "record the session to FILE")
 
 
 def open_any_target(text: str, args: argparse.Namespace) -> Target:

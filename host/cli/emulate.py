@@ -46,6 +46,7 @@ from cubestack.host.emulation.history import History
 from cubestack.host.emulation.orbit import follow
 from cubestack.host.emulation.remote_controls import TOKEN
 from cubestack.host.options import option_string
+from cubestack.host.output import Outputs
 from cubestack.host.recording.setups import emulated_setup
 from cubestack.host.terminal import busy, progress, say
 
@@ -118,7 +119,7 @@ def run(args: argparse.Namespace) -> int:
     """
     ended: list[int] = []
     _check(args)
-    with ExitStack() as stack:
+    with Outputs() as stack:
         opened, setups = _power_up(args, stack)
         first = opened[0]
         gdb = None
@@ -185,7 +186,9 @@ def run(args: argparse.Namespace) -> int:
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, lambda _number, _frame: scheduler.stop())
         _announce(args, opened, served)
+        stack.keep()
         if isinstance(history, History):
+            history.keep()
             history.on_arrival = connect
             history.bus = adapter
             history.ports = [(opened.index(owner), line.name, end) for owner, line, end in served]
@@ -269,7 +272,7 @@ LARGEST_HISTORY = 1 << 30
 
 
 def _history(
-    args: argparse.Namespace, opened: list[AnyEmulated], setups: Sequence[Setup], stack: ExitStack
+    args: argparse.Namespace, opened: list[AnyEmulated], setups: Sequence[Setup], stack: Outputs
 ) -> History | str:
     """The history that the control port can go back in, or why there is none."""
     given = [option_string(name) for name in FORWARD_ONLY if getattr(args, name) is not None]

@@ -21,7 +21,7 @@ from collections.abc import Callable, Mapping
 
 from cubestack.firmware_model.interface.codec.message import Interface
 from cubestack.firmware_model.interface.efm32gg.table import Processor
-from cubestack.host.cli.arguments import add_path
+from cubestack.host.cli.arguments import add_output
 from cubestack.host.devices.registry import device, emulated_names
 from cubestack.host.export.c_header import c_header
 from cubestack.host.export.cosmos.packets import cosmos
@@ -30,6 +30,7 @@ from cubestack.host.export.processor import processor_header, svd
 from cubestack.host.export.python_module import python_module
 from cubestack.host.export.wireshark import wireshark
 from cubestack.host.export.xtce import xtce
+from cubestack.host.output import write_output
 
 #: Exporter of an interface by format.
 OF_INTERFACE: dict[str, Callable[[Interface], str]] = {
@@ -54,7 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--format", choices=(*OF_INTERFACE, *TO_FOLDER, *OF_PROCESSOR), required=True
     )
-    add_path(parser, "--out", "default: standard output; a new folder for cosmos-plugin")
+    add_output(parser, "--out", "default: standard output; a new folder for cosmos-plugin")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -75,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
     elif args.out.is_dir():
         raise ValueError(f"--out {args.out} is a folder; name a file in it")
     else:
-        args.out.write_text(text, encoding="utf-8")
+        write_output(args.out, text)
     return 0
 
 

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cubestack.firmware_model.values import whole
-from cubestack.host.cli.arguments import add_flag, add_path, add_value
+from cubestack.host.cli.arguments import add_flag, add_output, add_value
 from cubestack.host.cli.device_options import (
     add_board_arguments,
     add_engine_arguments,
@@ -46,7 +46,7 @@ LOOK_S = 0.5
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("targets", nargs="+", metavar="TARGET", help=FORMS)
     add_line_arguments(parser)
-    add_path(parser, "--record", "record the session with a device that is not emulated here")
+    add_output(parser, "--record", "record the session with a device that is not emulated here")
     parser.add_argument("--scene", metavar="FILE", help="for an emulated device")
     add_value(parser, "seed", whole(None, "for an emulated device", 0))
     add_engine_arguments(parser)

@@ -15,7 +15,6 @@ import argparse
 import json
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import ExitStack
 from typing import Any
 
 from rich.table import Table
@@ -40,6 +39,7 @@ from cubestack.host.errors import TargetError
 from cubestack.host.experiments.measure import board_as_said, board_options, running
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.options import option_string
+from cubestack.host.output import Outputs
 from cubestack.host.terminal import progress, say, show, tell
 
 SHOWN = 40
@@ -116,7 +116,7 @@ def run_experiment(args: argparse.Namespace, device: AnyDevice, experiment: AnyE
     started = time.monotonic()
     results: list[Result] = []
     least: float | None = getattr(args, "min_right", None)
-    with ExitStack() as stack:
+    with Outputs() as stack:
         look_at = insight(args, stack) if hasattr(args, "gdb") else lambda _emulated: None
 
         def connect(emulated: AnyEmulated) -> None:

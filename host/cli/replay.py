@@ -16,7 +16,6 @@ examples:
 
 import argparse
 import json
-from contextlib import ExitStack
 
 from cubestack.emulator.recording.replay import SETTLE_PS, Replay
 from cubestack.firmware_model.formats.recording import load_recording
@@ -33,6 +32,7 @@ from cubestack.host.cli.device_options import (
 from cubestack.host.emulation.controls import EmulatedControls
 from cubestack.host.emulation.history import Recipe
 from cubestack.host.emulation.records import create_record, start_trace
+from cubestack.host.output import Outputs
 from cubestack.host.recording.setups import setup_for
 from cubestack.host.terminal import busy, say
 
@@ -54,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
     span = _span(args)
     recording = load_recording(args.recording)
     setup = setup_for(recording, seed=args.seed, scene=args.scene, faults=args.faults, tell=say)
-    with ExitStack() as stack:
+    with Outputs() as stack:
         opened = Recipe.of(recording, setup, given_options(args)).make(args.engine)
         stack.callback(opened.close)
         whole = argparse.Namespace(record=args.record, trace=None if span else args.trace)
@@ -75,7 +75,9 @@ def run(args: argparse.Namespace) -> int:
         print(json.dumps({"recording": str(args.recording), "differences": differences}))
     else:
         duration_s = recording.end_ps / 1e12
-        print(shown_lines("\n".join(differences)) or f"{duration_s:.3f} s replayed: no difference")
+        cut = "" if recording.whole else "; the recording was cut off there"
+        same = f"{duration_s:.3f} s replayed: no difference{cut}"
+        print(shown_lines("\n".join(differences)) or same)
     return int(bool(differences))
 
 

@@ -23,6 +23,7 @@ from cubestack.host.devices.registry import device
 from cubestack.host.emulation.controls import EmulatedControls
 from cubestack.host.emulation.emulated import AnyEmulated, power_up, scene_files
 from cubestack.host.emulation.records import create_record, start_recorder
+from cubestack.host.output import Outputs
 from cubestack.host.recording.record_file import RecordFile
 from cubestack.host.recording.setups import split_mark, written
 from cubestack.host.terminal import say
@@ -125,6 +126,7 @@ class _Kept:
     path: Path
     file: RecordFile
     recorder: Recorder
+    keep: Callable[[], None]  # gives the file its name
     stack: ExitStack
 
 
@@ -165,6 +167,11 @@ class History:
     def again(self) -> bool:
         return bool(self._replays)
 
+    def keep(self) -> None:
+        """Give the recordings their names; call it when everything has started."""
+        for one in self._kept:
+            one.keep()
+
     def controls(self) -> list[EmulatedControls]:
         return [EmulatedControls(one) for one in self.devices]
 
@@ -174,6 +181,7 @@ class History:
         kept.recorder.flush()
         if kept.file.stopped:
             raise ValueError(f"the history is not whole: {kept.file.stopped}")
+        kept.keep()
         return kept.path
 
     def begin_again(self, end_ps: int) -> None:
@@ -201,6 +209,7 @@ class History:
         self.devices[:] = [first, *rest]
         setups = [recipe.setup for recipe in recipes]
         self._kept = [self._keep(*one) for one in zip(self.devices, setups, paths, strict=True)]
+        self.keep()
         controls = self.controls()
         self._replays = [
             _replay(one, made, control.act, alone=not number)
@@ -227,11 +236,11 @@ class History:
             one.stack.close()
 
     def _keep(self, made: AnyEmulated, setup: Setup, path: Path) -> _Kept:
-        with ExitStack() as stack:
+        with Outputs() as stack:
             file = create_record(path, stack, self._largest)
             recorder = start_recorder(made, file, setup)
             stack.callback(recorder.close)
-            return _Kept(path, file, recorder, stack.pop_all())
+            return _Kept(path, file, recorder, stack.keep, stack.pop_all())
 
 
 def _replay(

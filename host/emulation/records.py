@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import errno
 from collections import defaultdict
 from collections.abc import Callable
-from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any
 
 from cubestack.host.emulation.emulated import AnyEmulated
+from cubestack.host.output import OutputFile, Outputs
 from cubestack.host.recording.record_file import RecordFile
 from cubestack.host.recording.setups import option_files
 
@@ -70,18 +71,21 @@ def start_trace(emulated: AnyEmulated, stream: TextSink) -> VcdTrace:
     return trace
 
 
-def create_file(path: Path, stack: ExitStack) -> IO[str]:
-    """Open ``path`` for writing; ``stack`` closes it. Raises ValueError if it cannot be written."""
-    try:
-        return stack.enter_context(path.open("w", encoding="utf-8", newline=""))
-    except OSError as error:
-        raise ValueError(f"can not write {path}: {error.strerror}") from None
+def create_record(path: Path, files: Outputs, largest: int | None = None) -> RecordFile:
+    """Open a file that grows for as long as the emulation runs, up to ``largest`` bytes.
 
+    Raises ValueError if it cannot be written.
+    """
+    opened = files.create(path)
+    file = RecordFile(opened, largest)
 
-def create_record(path: Path, stack: ExitStack, largest: int | None = None) -> RecordFile:
-    """As ``create_file``, for what goes on for as long as the emulation does."""
-    file = RecordFile(create_file(path, stack), largest)
-    stack.callback(file.flush)
+    def flush() -> None:
+        file.flush()
+        if file.stopped:
+            raise OSError(errno.EIO, file.stopped)
+
+    opened.before_kept = flush
+    files.callback(file.flush)
     return file
 
 
@@ -92,16 +96,16 @@ class InsightFiles:
     profile: Path | None = None
     coverage: Path | None = None
 
-    def open(self, stack: ExitStack) -> Callable[[AnyEmulated], None]:
-        """Open the files; ``stack`` writes them for each device passed to the returned function.
+    def open(self, files: Outputs) -> Callable[[AnyEmulated], None]:
+        """Open the files; ``files`` writes them for each device passed to the returned function.
 
         Raises ValueError for a file that cannot be written.
         """
         from cubestack.emulator.iss.insight.reports import write_callgrind, write_lcov
 
         by_program: dict[Any, list[Observer]] = defaultdict(list)
-        outputs: list[tuple[IO[str], Any]] = [
-            (create_file(path, stack), write)
+        outputs: list[tuple[OutputFile, Any]] = [
+            (files.create(path), write)
             for path, write in ((self.profile, write_callgrind), (self.coverage, write_lcov))
             if path is not None
         ]
@@ -118,9 +122,10 @@ class InsightFiles:
                 _merge(observers)
                 for stream, write in outputs:
                     write(observers[0], stream)
+                    stream.keep()  # even if the command ends with an error
 
         if outputs:
-            stack.callback(write_all)
+            files.callback(write_all)
             return watch
         return lambda _emulated: None
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from cubestack.host.clients.contract import FoundStar
+from cubestack.host.output import write_output
 from cubestack.host.pictures.overlay import star_name
 from cubestack.host.pictures.sheet import GRID, TRUTH, Entry, Lens, Sheet
 
@@ -65,8 +66,10 @@ class TrueStar:
 
 
 def save_picture(picture: NDArray[np.uint8], path: Path) -> None:
-    """Write grey values (rows, columns) unchanged as PNG."""
-    Image.fromarray(picture).save(path)
+    """Write grey values (rows, columns) unchanged as PNG; raises ValueError if it cannot."""
+    content = BytesIO()
+    Image.fromarray(picture).save(content, "png")
+    write_output(path, content.getvalue())
 
 
 def save_sample(picture: NDArray[np.uint8], path: Path | BinaryIO) -> None:

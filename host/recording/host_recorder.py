@@ -52,6 +52,11 @@ class HostRecorder:
     def bus(self, bus: I2cBus) -> I2cBus:
         return _RecordingBus(self, bus)
 
+    def close(self) -> None:
+        """Mark the end; the stream stays open."""
+        if self._writer is not None:
+            self._writer.end()
+
     def now_ps(self) -> int:
         return (self._clock_ns() - self._start_ns) * PS_PER_NS
 

@@ -32,7 +32,7 @@ from cubestack.host.cli.measure import add_devices, run_experiment
 from cubestack.host.clients.contract import DeviceClient, FoundStar
 from cubestack.host.devices.experiment import Experiment, Result
 from cubestack.host.experiments.opener import Opener
-from cubestack.host.options import Options, path_option
+from cubestack.host.options import Options, output_option, path_option
 from cubestack.host.pictures.images import save_residuals
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff")
@@ -60,7 +60,7 @@ class CalibrateOptions(Options):
         None, "JSON with a rough f_px, cx_px, cy_px, k1, k2, p1, p2; default: the device's tables"
     )
     rounds: int = whole(2, "times that stars are identified, each with the camera found before", 1)
-    out: Path | None = path_option(
+    out: Path | None = output_option(
         None, "camera file to be written, and beside it a .png of residuals"
     )
 

@@ -16,23 +16,22 @@ import argparse
 import csv
 import sys
 import time
-from contextlib import ExitStack
 
 from cubestack.firmware_model.values import number, whole
-from cubestack.host.cli.arguments import add_path, add_value
+from cubestack.host.cli.arguments import add_output, add_value
 from cubestack.host.cli.device_options import add_target_arguments, open_any_target
 from cubestack.host.cli.shell import split_commands
 from cubestack.host.clients.contract import Columns
 from cubestack.host.devices.result_table import log_lines, scatter
-from cubestack.host.emulation.records import create_file
 from cubestack.host.errors import TargetError
+from cubestack.host.output import Outputs
 from cubestack.host.shell.language import Shell
 from cubestack.host.terminal import say
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_target_arguments(parser)
-    add_path(parser, "--out", "default: standard output", "FILE.csv")
+    add_output(parser, "--out", "default: standard output", "FILE.csv")
     add_value(parser, "count", whole(None, "lines; default: until Ctrl-C", 1, metavar="N"))
     add_value(parser, "interval", number(1.0, "of the lines (default 1)", 0, 86_400, "s"))
     for option, name, when in (("-c", "first", "the first line"), ("--each", "each", "every line")):
@@ -43,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Log; returns 0 if every line has a result."""
     lines: list[Columns] = []
-    with ExitStack() as stack:
+    with Outputs() as stack:
         target = open_any_target(args.target, args)
         stack.callback(target.close)
         if target.device is None:
@@ -56,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
                 shell.execute(command)
 
         perform(args.first)
-        stream = create_file(args.out, stack) if args.out else sys.stdout
+        stream = stack.create(args.out) if args.out else sys.stdout
         writer: csv.DictWriter[str] | None = None
         try:
             for line in log_lines(
@@ -70,6 +69,7 @@ def run(args: argparse.Namespace) -> int:
                 if writer is None and line["error"] is None:
                     writer = csv.DictWriter(stream, list(line))
                     writer.writeheader()
+                    stack.keep()
                     writer.writerows(lines[:-1])
                 if writer is not None:
                     writer.writerow(line)

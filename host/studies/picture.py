@@ -12,7 +12,6 @@ examples:
 
 import argparse
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 from cubestack.emulator.camera.common.image_sensor import StarSensor
@@ -20,7 +19,7 @@ from cubestack.emulator.camera.common.view import View
 from cubestack.emulator.scene.attitude import quaternion_from_pointing
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.firmware_model.values import number, whole
-from cubestack.host.cli.arguments import add_flag, add_path, add_value
+from cubestack.host.cli.arguments import add_flag, add_output, add_path, add_value
 from cubestack.host.clients.quaternions import pointing_deg
 from cubestack.host.devices.registry import device, device_names
 from cubestack.host.emulation.emulated import open_device
@@ -42,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--mag-limit", type=float, metavar="V", help="only brighter stars")
     add_value(parser, "seed", whole(0, "of the noise (default 0)", 0))
     add_flag(parser, "--stretched", "lift faint stars for the eye; not for uploads")
-    parser.add_argument("--out", type=Path, required=True, metavar="FILE.png")
+    add_output(parser, "--out", "image to write", "FILE.png", required=True)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -54,10 +53,7 @@ def run(args: argparse.Namespace) -> int:
         assert isinstance(camera, StarSensor)
         picture, truth = camera.rendered, camera.scene.truth(emulated.board.kernel.now)
         assert picture is not None
-    try:
-        save_picture(stretched(picture, SKY) if args.stretched else picture, args.out)
-    except OSError as error:
-        raise ValueError(f"can not write {args.out}: {error.strerror}") from None
+    save_picture(stretched(picture, SKY) if args.stretched else picture, args.out)
     rows, columns = picture.shape
     say(f"{args.out}: {columns} x {rows} pixels")
     if truth is not None:

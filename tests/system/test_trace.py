@@ -5,7 +5,7 @@ The files are those of ``--trace``, made from recordings by a replay as well.
 
 import argparse
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -15,6 +15,7 @@ from cubestack.host.cli.device_options import record
 from cubestack.host.cli.main import main
 from cubestack.host.clients.contract import Client
 from cubestack.host.emulation.emulated import open_device
+from cubestack.host.output import Outputs
 from cubestack.host.recording.setups import emulated_setup
 from tests.emulator.recording import vcd
 
@@ -30,7 +31,7 @@ def read(path: Path) -> vcd.Changes:
 def traced(device: str, folder: Path) -> Iterator[Client]:
     """The client of a device that is traced and recorded in ``folder``."""
     args = argparse.Namespace(record=folder / "run.rec", trace=folder / "run.vcd")
-    with open_device(device, seed=2) as opened, ExitStack() as stack:
+    with open_device(device, seed=2) as opened, Outputs() as stack:
         record(args, opened, stack, emulated_setup(2, None))
         yield opened.client.client
 

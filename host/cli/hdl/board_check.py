@@ -9,7 +9,7 @@ from rich.table import Table
 
 from cubestack.firmware_model.interface.devboard.address import PREFIX, parse_address
 from cubestack.firmware_model.values import whole
-from cubestack.host.cli.arguments import add_flag, add_path, add_value
+from cubestack.host.cli.arguments import add_flag, add_output, add_value
 from cubestack.host.cli.device_options import add_board_arguments, chosen_options
 from cubestack.host.cli.hdl.design import fpga_wiring
 from cubestack.host.devices.registry import device as registered
@@ -46,7 +46,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_value(parser, "seed", whole(0, "seed of the random steps", 0))
     add_value(parser, "steps", whole(200, "number of random steps", 0, metavar="N"))
     add_value(parser, "frames", whole(1, "whole frames for each way to store", 0, metavar="N"))
-    add_path(parser, "--out", f"write the pins around a difference as {VCD_FILE}", "DIR")
+    add_output(
+        parser, "--out", f"write the pins around a difference as {VCD_FILE}", "DIR", inside=VCD_FILE
+    )
     add_flag(parser, "--json", "print one JSON object")
     add_board_arguments(parser)
 

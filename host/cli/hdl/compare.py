@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from rich.table import Table
 
 from cubestack.firmware_model.values import number, whole
-from cubestack.host.cli.arguments import add_flag, add_path, add_value
+from cubestack.host.cli.arguments import add_flag, add_output, add_value
 from cubestack.host.cli.device_options import add_board_arguments, chosen_options
 from cubestack.host.cli.hdl.design import fpga_wiring
 from cubestack.host.devices.registry import device as registered
@@ -67,7 +67,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_value(
         parser, "last", whole(10, "changes shown before the first difference", 1, metavar="N")
     )
-    add_path(parser, "--out", f"write both as {VCD_FILE}, for cubestack hdl wave", "DIR")
+    add_output(
+        parser, "--out", f"write both as {VCD_FILE}, for cubestack hdl wave", "DIR", inside=VCD_FILE
+    )
     add_flag(parser, "--json", "print one JSON object")
     add_board_arguments(parser)
 

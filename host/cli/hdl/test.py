@@ -10,7 +10,7 @@ from cubestack.firmware_model.values import whole
 from cubestack.hdl.contract.contract import QUICK, TIERS, Contract
 from cubestack.hdl.contract.points import Coverage
 from cubestack.hdl.contract.running import Report, Result, run_checks, write_junit
-from cubestack.host.cli.arguments import add_flag, add_path, add_value
+from cubestack.host.cli.arguments import add_flag, add_output, add_value
 from cubestack.host.cli.hdl.design import FILE, add_design, design_of
 from cubestack.host.cli.hdl.wave import FOLDERS
 from cubestack.host.terminal import say, tell
@@ -51,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="says what the design keeps of a frame (docs/how-to/change-the-gateware.md)",
     )
     add_value(parser, "seed", whole(0, "added to the seeds of all tests", 0))
-    add_path(parser, "--junit", "write the results as JUnit's XML")
+    add_output(parser, "--junit", "write the results as JUnit's XML")
     parser.add_argument(
         "--waves",
         type=Path,

@@ -4,8 +4,9 @@ import argparse
 
 from cubestack.hdl.flow.top import tops_in
 from cubestack.hdl.flow.verilog import verilog_file
-from cubestack.host.cli.arguments import add_path
+from cubestack.host.cli.arguments import add_output
 from cubestack.host.cli.hdl.choice import one
+from cubestack.host.output import write_output
 
 NAME = "verilog"
 
@@ -23,7 +24,7 @@ examples:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("top", metavar="TOP", help="a top; a wrong name lists them")
-    add_path(parser, "--out", "default: standard output")
+    add_output(parser, "--out", "default: standard output")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -32,5 +33,5 @@ def run(args: argparse.Namespace) -> int:
     if args.out is None:
         print(text, end="")
     else:
-        args.out.write_text(text, encoding="utf-8")
+        write_output(args.out, text)
     return 0

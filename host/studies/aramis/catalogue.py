@@ -19,7 +19,8 @@ from cubestack.emulator.boards.aramis.catalogue import (
 from cubestack.firmware_model.values import number, whole
 from cubestack.host.devices.device import Shown
 from cubestack.host.experiments.facts import Lookup
-from cubestack.host.options import Options, path_option
+from cubestack.host.options import Options, output_option
+from cubestack.host.output import write_output
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,7 +33,7 @@ class CatalogueOptions(Options):
     stars_per_field: int | None = whole(None, "brightest kept, default 6", 3, 50, metavar="N")
     step: float | None = number(None, "of the scan, default 1", unit="deg")
     longest_side: float | None = number(None, "of a triangle, default: the field", unit="deg")
-    output: Path | None = path_option(None, "write the flash image")
+    output: Path | None = output_option(None, "write the flash image")
 
     def parameters(self) -> CatalogueParameters:
         """Arguments of the catalogue's compiler; raises ValueError if invalid."""
@@ -60,7 +61,7 @@ class _Catalogue(Lookup[CatalogueOptions]):
         seconds = time.monotonic() - start
         image = database.pack()
         if options.output is not None:
-            options.output.write_bytes(image)
+            write_output(options.output, image)
         return {
             "fov_deg": parameters.fov_deg,
             "stars_per_field": parameters.stars_per_field,

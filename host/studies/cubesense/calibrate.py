@@ -39,7 +39,8 @@ from cubestack.host.experiments.cubesense.measure import (
     random_view,
     view_of,
 )
-from cubestack.host.options import Options, path_option
+from cubestack.host.options import Options, output_option, path_option
+from cubestack.host.output import write_output
 
 FIELD = (PIXELS_PER_DEGREE, 95.0)
 """Undistorted pixels per degree, and the largest field angle in deg."""
@@ -78,7 +79,7 @@ class CalibrateOptions(Options):
     check_poses: int = whole(
         30, "random poses measured before and after (default 30)", 1, metavar="N"
     )
-    out: Path | None = path_option(None, "JSON file to be written")
+    out: Path | None = output_option(None, "JSON file to be written")
 
     def check(self) -> None:
         """Images need angles and one sensor; the bench needs neither."""
@@ -129,7 +130,7 @@ class _Experiment(Experiment["CubeSenseOpener", CalibrateOptions, CalibrateResul
             yield results[-1]
         if options.out is not None:
             told = {one.sensor: one.as_dict() for one in results}
-            options.out.write_text(json.dumps(told, indent=2) + "\n", encoding="utf-8")
+            write_output(options.out, json.dumps(told, indent=2) + "\n")
 
     def summarise(self, results: Sequence[CalibrateResult], wall_s: float) -> Iterator[str]:
         for one in results:

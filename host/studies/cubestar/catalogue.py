@@ -7,7 +7,6 @@ examples:
   cubestack catalogue cubestar --c catalogue.c         star list and pair list as C arrays
 """
 
-from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,10 +14,10 @@ from typing import Any
 from cubestack.emulator.boards.cubestar import catalogue as flown
 from cubestack.firmware_model.values import number
 from cubestack.host.devices.device import Shown
-from cubestack.host.emulation.records import create_file
 from cubestack.host.experiments.facts import Lookup
 from cubestack.host.export.c_header import c_arrays
-from cubestack.host.options import Options, path_option
+from cubestack.host.options import Options, output_option
+from cubestack.host.output import write_output
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,7 +27,7 @@ class CatalogueOptions(Options):
     mag_limit: float | None = number(None, "faintest star; default 3.8", metavar="V")
     epoch: float = number(2026.0, "default 2026", 1800, 2200, metavar="YEAR")
     pair_limit: float | None = number(None, "default: as flown", unit="deg")
-    c: Path | None = path_option(None, "write star list and pair list as C arrays")
+    c: Path | None = output_option(None, "write star list and pair list as C arrays")
 
 
 class _Catalogue(Lookup[CatalogueOptions]):
@@ -44,9 +43,7 @@ class _Catalogue(Lookup[CatalogueOptions]):
                 f"CubeStar's catalogue: V < {mag_limit:g}, pairs closer than {pair_limit:g} deg,"
                 f" epoch {options.epoch:g}; SHA-256 of the arrays {catalogue.sha256()}"
             )
-            with ExitStack() as stack:
-                stream = create_file(options.c, stack)
-                stream.write(c_arrays("catalogue", catalogue.arrays(), about))
+            write_output(options.c, c_arrays("catalogue", catalogue.arrays(), about))
         return {
             "mag_limit": mag_limit,
             "pair_limit_deg": pair_limit,

@@ -19,11 +19,12 @@ from pathlib import Path
 from rich.table import Table
 
 from cubestack.firmware_model.values import whole
-from cubestack.host.cli.arguments import add_flag, add_path, add_value
+from cubestack.host.cli.arguments import add_flag, add_output, add_value
 from cubestack.host.studies.powerfail import report
 from cubestack.host.studies.powerfail.cases import cases_of
 from cubestack.host.studies.powerfail.course import Course, learn
 from cubestack.host.studies.powerfail.replay import Gdb, Witness, replay
+from cubestack.host.studies.powerfail.report import ROWS
 from cubestack.host.studies.powerfail.rig import Setup, marked
 from cubestack.host.studies.powerfail.run import fresh_rig
 from cubestack.host.studies.powerfail.run import run as run_cases
@@ -47,8 +48,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         required=True,
         help="TOML file: commands, questions",
     )
-    add_path(parser, "--out", f"folder of the results (default: IMAGE{SUFFIX})", "FOLDER")
-    add_flag(parser, "--force", "replace the results in that folder")
+    add_output(
+        parser, "--out", f"folder of the results (default: IMAGE{SUFFIX})", "FOLDER", inside=ROWS
+    )
     where = parser.add_mutually_exclusive_group()
     add_value(
         where, "workers", whole(None, "processes (default: one for each core)", 1, metavar="N")

@@ -37,28 +37,33 @@ def test_recording_events_round_trip(tmp_path_factory, events, setup):
     writer = recording.RecordingWriter(stream, "cubestar", {"uart": 57_600}, setup)
     for event in events:
         writer.write(event)
+    writer.end()
     path = tmp_path_factory.getbasetemp() / "some.rec"
     path.write_text(stream.getvalue(), encoding="utf-8")
     found = recording.load_recording(path)
+    assert found.whole
     assert (found.device, found.bauds) == ("cubestar", {"uart": 57_600})
     assert found.setup == setup
     assert list(found.events) == sorted(events, key=lambda event: event.time_ps)
 
 
-@given(st.lists(LINES, min_size=1, max_size=5), st.data())
-def test_recording_that_was_cut_off_has_the_events_before(tmp_path_factory, events, data):
+@given(st.lists(EVENTS, max_size=8), st.data())
+def test_recording_that_was_cut_off_has_its_whole_events(tmp_path_factory, events, data):
     stream = io.StringIO()
     writer = recording.RecordingWriter(stream, "cubestar", {"uart": 57_600})
-    ends = [len(stream.getvalue())]
+    header = len(stream.getvalue())
+    ends = [header]
     for event in events:
         writer.write(event)
         ends.append(len(stream.getvalue()))
-    size = data.draw(st.integers(ends[0], ends[-1]))
+    writer.end()
+    length = data.draw(st.integers(header, len(stream.getvalue()) - 2))
     path = tmp_path_factory.getbasetemp() / "cut.rec"
-    path.write_text(stream.getvalue()[:size], encoding="utf-8")
-    whole = sum(end <= size + 1 for end in ends) - 1  # the last one may lack its end of line
-    expected = sorted(events[:whole], key=lambda event: event.time_ps)
-    assert list(recording.load_recording(path).events) == expected
+    path.write_text(stream.getvalue()[:length], encoding="utf-8")
+    found = recording.load_recording(path)
+    count = sum(end - 1 <= length for end in ends[1:])  # the end of its line may be missing
+    assert list(found.events) == sorted(events[:count], key=lambda event: event.time_ps)
+    assert not found.whole
 
 
 HEADER = '{"recording": 1, "device": "x", "lines": {"uart": 1200}}\n'
@@ -70,10 +75,17 @@ EVENT = '{"ps": 1, "port": "uart", "from": "%s", "data": "%s", "byte_ps": 1}'
     [
         ("", "it is empty"),
         ("hello", "line 1: not valid JSON: Expecting value"),
-        ('{"recording": 2}', "line 1: there is no header"),
+        (
+            '{"recording": 3}',
+            "line 1: the recording has version 3, this program reads 1 and 2; update cubestack",
+        ),
+        ('{"recording": 0}', "make the recording again"),
+        ('{"recording": "2"}', "must be a whole number, not '2'"),
         ('{"recording": 1}', "line 1: lacks 'lines'"),
         ("[]", "line 1: a line must be an object"),
         (HEADER + '{"ps": 1}', "line 2: lacks 'port'"),
+        (HEADER + '{"ps": 1\n', "line 2: Expecting"),
+        (HEADER + '{"events": 1}', "line 2: it ends after 0 events, not 1"),
         (HEADER + EVENT % ("me", ""), 'line 2: "from" must be'),
         (HEADER + EVENT % ("host", "xy"), "line 2: non-hexadecimal"),
         (HEADER + EVENT.replace("1,", "-1,", 1) % ("host", ""), '"ps" must be a whole number in 0'),

@@ -11,7 +11,6 @@ from cubestack.emulator.camera.mlx75412.lens import LENS
 from cubestack.host.calibration.camera import Camera, load_camera, save_camera
 from cubestack.host.calibration.fisheye import Fisheye, fit_fisheye, limb_angles
 from cubestack.host.calibration.stars import PARAMETERS, Sight, fit_camera
-from cubestack.host.errors import CameraFileError
 
 POINTS = np.stack(np.meshgrid(np.linspace(-0.4, 0.4, 7), np.linspace(-0.2, 0.2, 5)), -1)
 TERMS = {"k1": -0.2, "k2": 0.1, "p1": 0.004, "p2": -0.003}
@@ -176,5 +175,5 @@ def test_rejects_too_few_stars(given: list[Sight]) -> None:
 def test_camera_file_round_trip(tmp_path) -> None:
     save_camera(TRUE_CAMERA, tmp_path / "camera.json")
     assert load_camera(tmp_path / "camera.json") == TRUE_CAMERA
-    with pytest.raises(CameraFileError, match="choose a path that can be written"):
+    with pytest.raises(ValueError, match=r"can not write .*: Is a directory"):
         save_camera(TRUE_CAMERA, tmp_path)

@@ -1,6 +1,5 @@
 import argparse
 import json
-from contextlib import ExitStack
 
 import pytest
 
@@ -9,6 +8,7 @@ from cubestack.firmware_model.cubesense.state import CameraSettings
 from cubestack.host.cli.device_options import inject_plan, record
 from cubestack.host.emulation import history as past
 from cubestack.host.emulation.emulated import open_device, power_up
+from cubestack.host.output import Outputs
 from cubestack.host.recording.setups import emulated_setup
 
 HEADER = '{"recording":1,"device":"cubesense","lines":{}'
@@ -20,7 +20,7 @@ pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler
 def recording(tmp_path):
     path = tmp_path / "a.rec"
     args = argparse.Namespace(record=path, trace=tmp_path / "a.vcd")
-    with open_device("cubesense", seed=3) as opened, ExitStack() as stack:
+    with open_device("cubesense", seed=3) as opened, Outputs() as stack:
         record(args, opened, stack, emulated_setup(3, None))
         client = opened.client.client
         client.telemetry("Configuration")
@@ -143,7 +143,7 @@ def test_plan_of_faults_and_options_are_in_the_header(tmp_path, run, monkeypatch
     plan.write_text('seed = 9\n[[fault]]\nkind = "uart-drop"\nrate = 0.2\n')
     made = tmp_path / "a.rec"
     args = argparse.Namespace(record=made, trace=None)
-    with open_device("cubesense", seed=3, baud=9600) as opened, ExitStack() as stack:
+    with open_device("cubesense", seed=3, baud=9600) as opened, Outputs() as stack:
         inject_plan(opened.board.faults, plan)
         setup = emulated_setup(3, None, plan, {"mcu_addressing": True})
         record(args, opened, stack, setup)

@@ -2,7 +2,6 @@ import socket
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -22,6 +21,7 @@ from cubestack.host.devices.registry import device as registered
 from cubestack.host.emulation.emulated import open_device, power_up
 from cubestack.host.emulation.records import InsightFiles, open_gdb
 from cubestack.host.experiments.measure import measure
+from cubestack.host.output import Outputs
 from tests.emulator.iss.efm32gg.bench import MS, Bench
 
 ASK = bytes([0x1F, 0x7F, 128, 0x1F, 0xFF])
@@ -144,7 +144,7 @@ def test_device_without_switches_rejects_a_profile(tmp_path: Path) -> None:
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_profile_sums_the_cycles_of_all_devices(tmp_path: Path, count: int) -> None:
     path, cycles = tmp_path / "profile", 0
-    with ExitStack() as stack:
+    with Outputs() as stack:
         watch = InsightFiles(profile=path).open(stack)
         for number in range(1, count + 1):
             bench = Bench()

@@ -1,7 +1,6 @@
 import json
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
-from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -13,6 +12,7 @@ from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.formats.recording import load_recording
 from cubestack.host.emulation.emulated import AnyEmulated, open_device
 from cubestack.host.emulation.history import History
+from cubestack.host.output import Outputs
 from cubestack.host.recording.setups import emulated_setup
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
@@ -23,7 +23,7 @@ Make = Callable[..., tuple[list[AnyEmulated], History]]
 
 @pytest.fixture
 def make(tmp_path: Path) -> Iterator[Make]:
-    with ExitStack() as stack:
+    with Outputs() as stack:
 
         def recorded(*names: str, scene: Path | None = None) -> tuple[list[AnyEmulated], History]:
             devices: list[AnyEmulated] = []
@@ -33,6 +33,7 @@ def make(tmp_path: Path) -> Iterator[Make]:
             files = [tmp_path / f"{name}.rec" for name in names]
             past = History(devices, [emulated_setup(4, scene)] * len(names), files)
             stack.callback(past.close)
+            past.keep()
             return devices, past
 
         yield recorded

@@ -6,7 +6,7 @@ import random
 import resource
 import signal
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -15,6 +15,7 @@ from cubestack.emulator.recording.replay import Replay
 from cubestack.firmware_model.formats.recording import load_recording
 from cubestack.host.emulation.emulated import open_device
 from cubestack.host.emulation.records import create_record, start_recorder
+from cubestack.host.output import Outputs
 from cubestack.host.recording.record_file import RecordFile
 from cubestack.host.recording.setups import emulated_setup
 
@@ -39,10 +40,11 @@ def test_emulation_goes_on_and_the_rest_replays(
 ) -> None:
     """The device answers as before; its recording has what came before the disk was full."""
     path = tmp_path / "some.rec"
-    with ExitStack() as stack:
+    with Outputs() as stack:
         device = stack.enter_context(open_device("cubesense", seed=3, engine="python"))
         recorder = start_recorder(device, create_record(path, stack), emulated_setup(3, None))
         stack.callback(recorder.close)
+        stack.keep()
         client = device.client.client
         with largest_file(1500):
             for _ in range(20):
@@ -55,6 +57,17 @@ def test_emulation_goes_on_and_the_rest_replays(
     with again:
         replay = Replay(found, again.board.kernel, again.board.uarts, again.board.i2c_bus)
         assert replay.run(again.device.interface) == []
+
+
+def test_disk_that_is_full_at_the_start_loses_no_earlier_file(tmp_path: Path) -> None:
+    path = tmp_path / "some.rec"
+    path.write_text("earlier")
+    with largest_file(1500), Outputs() as files:
+        create_record(path, files).write("x" * 10_000)
+        with pytest.raises(OSError, match="some.rec: File too large"):
+            files.keep()
+        files.pop_all()
+    assert path.read_text() == "earlier"
 
 
 def test_ends_with_a_whole_line_wherever_the_disk_is_full(

@@ -31,7 +31,7 @@ def test_first_difference_is_shown_with_its_pins(run: Run, tmp_path: Path) -> No
     call = ["--device", "cubestar", "--frames=0", "--steps=12", "--out", tmp_path]
     with behind_pty(board.receive) as port:
         outcome = run("hdl", "board", "check", port, *call)
-        listed = json.loads(run("hdl", "board", "check", port, *call, "--json").out)
+        listed = json.loads(run("hdl", "board", "check", port, *call, "--json", "--force").out)
     assert outcome.code == 1
     assert "first difference in step 1, " in outcome.out
     assert "SRAM_OE_N is 0 on the board, not 1" in outcome.out
