@@ -183,7 +183,7 @@ def test_out_writes_the_printed_text(form: str, run: Run, tmp_path: Path) -> Non
             )
             continue
         assert (printed.code, printed.err) == (0, "")
-        path = tmp_path / "file"
+        path = tmp_path / f"{device.name}.{form}"
         assert run("export", device.name, "--format", form, "--out", path) == (0, "", "")
         assert path.read_text(encoding="utf-8") == printed.out
 

@@ -174,7 +174,7 @@ def test_plan_of_faults_and_options_are_in_the_header(tmp_path, run, monkeypatch
     [
         (HEADER + ',"setup":{"seed":-1}}', '"seed" must be a whole number from 0, not -1'),
         (HEADER + '}\n{"ps":1,"control":["fly"]}', "nothing does 'fly'"),
-        ("nonsense", "is no recording of version 1: line 1"),
+        ("nonsense", "is no recording: line 1"),
         ('{"recording":1,"device":"mars","lines":{}}', "no device 'mars'"),
         ('{"recording":1,"device":"cubestar","lines":{"bench_uart":1}}', "has port bench_uart"),
     ],
@@ -200,5 +200,6 @@ def test_replay_traces_a_time_span(recording, run, tmp_path):
     assert max(times) == 1_000_000
     outcome = run("replay", recording, "--trace-from", "1")
     assert (outcome.code, "of --trace" in outcome.err) == (2, True)
-    outcome = run("replay", recording, "--trace", made, "--trace-from", "1", "--trace-to", "1")
+    words = ("--trace", made, "--force", "--trace-from", "1", "--trace-to", "1")
+    outcome = run("replay", recording, *words)
     assert "behind --trace-from" in outcome.err

@@ -81,7 +81,7 @@ FAILED, WRONG_CALL = 1, 2
         ("new-sensor numpy", "numpy is a Python module already; choose another name"),
         ("hdl verilog cubestarr", "cubestarr", "cubesense-sun"),
         ("hdl area cubesense-pair", "cubesense-pair", "cubesense-sun"),
-        ("hdl verilog cubestar --out /missing/cubestar.v", "missing", "No such file"),
+        ("hdl verilog cubestar --out /missing/cubestar.v", "can not write /missing/cubestar.v"),
         ("hdl prove sun-scam", "sun-scam", "sun-scan"),
         ("hdl paint", "paint", "area", "verilog"),
         ("hdl", "ACTION"),

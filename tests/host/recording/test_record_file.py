@@ -64,7 +64,7 @@ def test_disk_that_is_full_at_the_start_loses_no_earlier_file(tmp_path: Path) ->
     path.write_text("earlier")
     with largest_file(1500), Outputs() as files:
         create_record(path, files).write("x" * 10_000)
-        with pytest.raises(OSError, match="some.rec: File too large"):
+        with pytest.raises(OSError, match=r"some\.rec: File too large"):
             files.keep()
         files.pop_all()
     assert path.read_text() == "earlier"

@@ -42,7 +42,7 @@ def test_picture_command_renders_an_aramis_sky(run: Run, tmp_path: Path) -> None
 def test_stretched_brightens_faint_stars(run: Run, tmp_path: Path) -> None:
     pictures = []
     for words in ((), ("--stretched",)):
-        path = tmp_path / "sky.png"
+        path = tmp_path / f"sky{len(pictures)}.png"
         pose = ("--ra", "84", "--dec", "-1", "--seed", "3")
         assert run("picture", "cubestar", *pose, *words, "--out", str(path))[0] == 0
         with Image.open(path) as picture:
