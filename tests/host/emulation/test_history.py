@@ -33,7 +33,6 @@ def make(tmp_path: Path) -> Iterator[Make]:
             files = [tmp_path / f"{name}.rec" for name in names]
             past = History(devices, [emulated_setup(4, scene)] * len(names), files)
             stack.callback(past.close)
-            past.keep()
             return devices, past
 
         yield recorded
