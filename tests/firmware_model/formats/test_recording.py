@@ -84,7 +84,7 @@ EVENT = '{"ps": 1, "port": "uart", "from": "%s", "data": "%s", "byte_ps": 1}'
         ('{"recording": 1}', "line 1: lacks 'lines'"),
         ("[]", "line 1: a line must be an object"),
         (HEADER + '{"ps": 1}', "line 2: lacks 'port'"),
-        (HEADER + '{"ps": 1\n', "line 2: Expecting"),
+        (HEADER + '{"ps": 1\n', "line 2: not valid JSON: Expecting"),
         (HEADER + '{"events": 1}', "line 2: it ends after 0 events, not 1"),
         (HEADER + EVENT % ("me", ""), 'line 2: "from" must be'),
         (HEADER + EVENT % ("host", "xy"), "line 2: non-hexadecimal"),

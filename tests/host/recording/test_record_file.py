@@ -62,11 +62,14 @@ def test_emulation_goes_on_and_the_rest_replays(
 def test_disk_that_is_full_at_the_start_loses_no_earlier_file(tmp_path: Path) -> None:
     path = tmp_path / "some.rec"
     path.write_text("earlier")
-    with largest_file(1500), Outputs() as files:
-        create_record(path, files).write("x" * 10_000)
-        with pytest.raises(OSError, match=r"some\.rec: File too large"):
+
+    def start() -> None:
+        with largest_file(1500), Outputs() as files:
+            create_record(path, files).write("x" * 10_000)
             files.keep()
-        files.pop_all()
+
+    with pytest.raises(OSError, match=r"some\.rec: File too large"):
+        start()
     assert path.read_text() == "earlier"
 
 
