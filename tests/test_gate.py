@@ -42,6 +42,7 @@ OWN = {
     "host/ground/relays.py": "a recording that was read when it was opened",
     "host/ground/traces.py": "our recording, and the waveform of our process",
     "host/native/wheels.py": "what it has built",
+    "host/output.py": "files that it writes; it reads none",
     "host/studies/copies.py": "a copy of this process, through a pipe",
     "host/studies/costs.py": "our documents",
     "host/studies/cubestar/demo.py": "our package",

@@ -214,6 +214,7 @@ WRITERS = {
     "ground/emulators.py": "a temporary folder",
     "ground/traces.py": "a temporary folder",
     "ground/relays.py": "a temporary folder",
+    "emulation/history.py": "a temporary folder",
     "recording/setups.py": "a temporary folder",
     "studies/copies.py": "a pipe",
     "studies/demo.py": "the folder of a demonstration",
