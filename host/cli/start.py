@@ -6,9 +6,11 @@ Ctrl-C prints a traceback while the interpreter starts.
 
 import os
 import signal
+import sys
 from types import FrameType
 
 INTERRUPTED = 128 + signal.SIGINT
+AGAIN_S = 0.01
 
 
 def main() -> int:
@@ -22,6 +24,7 @@ def main() -> int:
         from cubestack.host.cli.main import main as run
 
         return run()
+    sys.unraisablehook = deliver_again
     try:
         from cubestack.host.cli.main import main as run
 
@@ -30,6 +33,16 @@ def main() -> int:
         return INTERRUPTED
     finally:
         signal.signal(signal.SIGINT, _end)  # a second one while the interpreter ends
+
+
+def deliver_again(lost: "sys.UnraisableHookArgs") -> None:
+    """Send Ctrl-C again if it came where exceptions are ignored, as in ``__del__``."""
+    if lost.exc_type is not KeyboardInterrupt:
+        sys.__unraisablehook__(lost)
+        return
+    from threading import Timer
+
+    Timer(AGAIN_S, os.kill, (os.getpid(), signal.SIGINT)).start()
 
 
 def _end(_number: int, _frame: FrameType | None) -> None:

@@ -6,9 +6,12 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from threading import Event
+from types import SimpleNamespace
 
 import pytest
 
+from cubestack.host.cli.start import deliver_again
 from tests.tiers import quick
 
 SCRIPT = Path(__file__).parents[3] / "host" / "cli" / "cubestack"
@@ -35,6 +38,16 @@ CASES = [
     for last_s in (0.4 if words.startswith("-") else 1.5,)
     for moment in range(MOMENTS)
 ]
+
+
+def test_ctrl_c_in_a_finalizer_is_not_lost() -> None:
+    again = Event()
+    before = signal.signal(signal.SIGINT, lambda _number, _frame: again.set())
+    try:
+        deliver_again(SimpleNamespace(exc_type=KeyboardInterrupt))  # type: ignore[arg-type]
+        assert again.wait(ENDED_S)
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def _heard() -> None:

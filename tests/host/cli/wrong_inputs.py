@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from cubestack.host.cli.main import main, make_parser
+from cubestack.host.cli.start import deliver_again
 
 DIGITS = "9" * 400
 DEPTH = 20_000
@@ -193,6 +194,7 @@ def _call(words: tuple[str, ...], folder: Path, errors: Path) -> int:
     for number, name in enumerate((os.devnull, os.devnull, errors)):
         os.dup2(os.open(name, os.O_RDWR | os.O_CREAT | os.O_TRUNC), number)
     sys.stdout = sys.stderr = io.TextIOWrapper(io.FileIO(2, "w", closefd=False), errors="replace")
+    sys.unraisablehook = deliver_again
     try:
         status = main(words)
     except SystemExit as end:
