@@ -45,7 +45,7 @@ MOST_STARS = 6000
 
 SAME_FIELD_DEG = 1e-3
 
-CROWDED_DEG = (8.0, 17.9)
+CROWDED_DEG = (8.0, 18.0)
 """Fields with more triangles than the flash holds (8 MB), if all sides up to the field counted."""
 
 CROWDED_SIDE = 0.86

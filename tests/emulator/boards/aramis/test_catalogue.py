@@ -13,6 +13,7 @@ from cubestack.emulator.boards.aramis.catalogue import CatalogueParameters, buil
 from cubestack.emulator.scene.hipparcos import load_sky
 from cubestack.firmware_model.aramis.catalogue.database import Database
 from cubestack.firmware_model.aramis.field import FOV_DEG
+from cubestack.firmware_model.interface.aramis import MOST_CATALOGUE_BYTES
 
 SMALL = CatalogueParameters(fov_deg=20, stars_per_field=3, mag_limit=3, step_deg=5)
 
@@ -183,3 +184,9 @@ def test_reports_progress() -> None:
 def test_rejects_impossible_parameters(parameters: CatalogueParameters, words: str) -> None:
     with pytest.raises(ValueError, match=words):
         build_database(parameters)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("field_deg", [8.0, 13.0, 17.99, 18.0])
+def test_catalogues_of_crowded_fields_fit_into_the_flash(field_deg: float) -> None:
+    assert len(aramis_catalogue.onboard_database(field_deg).pack()) <= MOST_CATALOGUE_BYTES
