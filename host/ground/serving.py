@@ -4,6 +4,7 @@ import asyncio
 import ipaddress
 import os
 import socket
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from threading import Event, Thread
@@ -19,11 +20,17 @@ LOOPBACK = "127.0.0.1"
 MOST_CONNECTIONS = 64
 """Most connections at once, so that clients can not slow down the emulation."""
 
+GRACE_S, MOST_AT_ONCE = 1.0, 1000
+"""Wall time in which a request can arrive although there are more, and most in such a burst."""
+
 REQUEST_S = 5.0
 """Time-out of the head of a request, wall time in s."""
 
 AUTHORISED = "cubestack.authorised"
 """Key that `Guard` adds to the scope of a request that it passes on."""
+
+SWITCH_S = 0.0002
+"""Wall time after which Python gives the other thread its turn; usually 25 times as long."""
 
 LARGEST_MESSAGE = 1 << 20
 """Longest message on a WebSocket in bytes."""
@@ -37,10 +44,14 @@ class _Connection(H11Protocol):
         self._since = self.loop.time()
         self._deadline: asyncio.TimerHandle | None = None
         self._await_request()
-        if len(self.connections) > MOST_CONNECTIONS:
-            own = (one for one in self.connections if isinstance(one, _Connection))
+        # One that was aborted is listed until the loop's next turn.
+        kept = [one for one in self.connections if not one.transport.is_closing()]
+        if len(kept) > MOST_CONNECTIONS:
+            own = (one for one in kept if isinstance(one, _Connection))
             waiting = [one for one in own if not one._authorised]
-            min(waiting, key=lambda one: one._since, default=self).transport.abort()
+            oldest = min(waiting, key=lambda one: one._since, default=self)
+            if self._since > oldest._since + GRACE_S or len(kept) > MOST_AT_ONCE:
+                oldest.transport.abort()
 
     def data_received(self, data: bytes) -> None:
         super().data_received(data)
@@ -95,6 +106,7 @@ class Serving:
                 ws="websockets-sansio",
                 ws_max_size=LARGEST_MESSAGE,
                 lifespan="off",
+                backlog=MOST_CONNECTIONS,  # accepted in one turn, before requests are read
                 log_level="critical",
                 access_log=False,
                 server_header=False,
@@ -109,7 +121,12 @@ class Serving:
 
     @contextmanager
     def running(self) -> Iterator[None]:
-        """Serve in a thread for the duration of the block."""
+        """Serve in a thread for the duration of the block.
+
+        The emulation, which is in another one and often waits, then gets its turn sooner.
+        """
+        before = sys.getswitchinterval()
+        sys.setswitchinterval(SWITCH_S)
         thread = Thread(target=self._server.run, args=([self._socket],), daemon=True)
         thread.start()
         self._server.ready.wait()
@@ -119,6 +136,7 @@ class Serving:
             self._server.should_exit = True
             thread.join()
             self._socket.close()
+            sys.setswitchinterval(before)
 
 
 class _Server(Server):
