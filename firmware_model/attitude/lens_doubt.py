@@ -41,6 +41,7 @@ LARGEST_SIGMA_RAD = 5.8e-4
 ODDS = 20.0  #: of an error of the principal point, below which the boresight stays as described
 CALM = 2.0  #: variance of the residuals, of the declared one, up to which one step is enough
 ROUNDS = 3
+SMALL_PX = 1.0  #: a step of the lens' errors after which another round changes nothing that counts
 COMMON = 2.0  #: further observations that one star's unexplained error makes worthless (chosen)
 
 _PRIOR_DEGREES = 6.0  #: observations that the declared errors count for
@@ -216,8 +217,8 @@ class _Stars:
             told = rows @ wanted.reshape(-1)
             told[3:] -= slack[3:] * error_px
             try:
-                step = np.linalg.solve(normal, told)
-                inverse = np.linalg.inv(normal)
+                step = np.asarray(np.linalg.solve(normal, told), float)
+                inverse = np.asarray(np.linalg.inv(normal), float)
             except np.linalg.LinAlgError:
                 return None
             self._charge_solution(count, size)
@@ -227,6 +228,8 @@ class _Stars:
             squares = np.sum(left * left, axis=1) / self.sigmas**2
             spread = _spread(squares, weights, float(np.sum(inverse * known)))
             weights = np.minimum((TAILS + 2) / (TAILS + squares / spread), 1)
+            if np.abs(step[3:]).max(initial=0.0) < SMALL_PX:
+                break
         return _Fitted(model, rotation, error_px, inverse * spread, squares, spread)
 
     def _linear(self, rotation: Reals, fields: Reals, error_px: Reals) -> tuple[Reals, Reals]:

@@ -98,7 +98,8 @@ class _Misdescribed(SensorHazard):
     @classmethod
     def sample(cls, strength: float, state: Any, generator: np.random.Generator) -> Self:
         one = super().sample(strength, state, generator)
-        return replace(one, **{cls.strength.key: strength * float(generator.choice([-1, 1]))})
+        signed: dict[str, Any] = {cls.strength.key: strength * float(generator.choice([-1, 1]))}
+        return replace(one, **signed)
 
     def displacement(self, lens: Lens) -> Displacement:
         """What it does to the picture."""
