@@ -103,7 +103,7 @@ class Parser(argparse.ArgumentParser):
             if path is None or inside is None or parsed.force:
                 continue
             place = path / inside
-            if place.is_file():
+            if place.is_file() and not action.renews(place):  # type: ignore[attr-defined]
                 option = action.option_strings[0]
                 self.error(f"{option}: {place} exists; choose another, or replace it with {FORCE}")
 
@@ -174,19 +174,27 @@ def add_output(
     *,
     inside: str = "",
     required: bool = False,
+    renews: Callable[[Path], bool] = lambda _path: False,
 ) -> None:
     """Declare an option that names a file to write, and ``--force`` to replace one that exists.
 
-    ``inside``: the option names a folder, in which this file is written.
+    Args:
+        parser, name, meaning, metavar, required: of the option.
+        inside: the option names a folder, in which this file is written.
+        renews: whether a file is an earlier output of the same command, which can be made again
+            and is replaced without ``--force``.
     """
     action = parser.add_argument(name, type=Path, metavar=metavar, help=meaning, required=required)
-    _declare_output(parser, action, inside)
+    _declare_output(parser, action, inside, renews)
 
 
 def _declare_output(
-    parser: argparse._ActionsContainer, action: argparse.Action, inside: str = ""
+    parser: argparse._ActionsContainer,
+    action: argparse.Action,
+    inside: str = "",
+    renews: Callable[[Path], bool] = lambda _path: False,
 ) -> None:
-    action.inside = inside  # type: ignore[attr-defined]
+    action.inside, action.renews = inside, renews  # type: ignore[attr-defined]
     whole = getattr(parser, "_container", parser)
     if FORCE not in whole._option_string_actions:
         add_flag(whole, FORCE, "replace files that exist")

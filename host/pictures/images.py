@@ -1,6 +1,7 @@
 """Pictures for people: grey values stretched and as PNG, marked stars, arrows of residuals."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -9,11 +10,16 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
+from PIL.PngImagePlugin import PngInfo
 
+from cubestack.firmware_model.formats.untrusted import UntrustedError, read_bytes
 from cubestack.host.clients.contract import FoundStar
 from cubestack.host.output import write_output
 from cubestack.host.pictures.overlay import star_name
 from cubestack.host.pictures.sheet import GRID, TRUTH, Entry, Lens, Sheet
+
+SOFTWARE = "cubestack picture"
+"""Text of that name in the pictures of ``save_picture``."""
 
 FEWEST_COUNTS = 24
 """Range of grey values that is stretched to the whole, at least: noise is not made a picture."""
@@ -67,9 +73,17 @@ class TrueStar:
 
 def save_picture(picture: NDArray[np.uint8], path: Path) -> None:
     """Write grey values (rows, columns) unchanged as PNG; raises ValueError if it cannot."""
-    content = BytesIO()
-    Image.fromarray(picture).save(content, "png")
+    content, about = BytesIO(), PngInfo()
+    about.add_text("Software", SOFTWARE)
+    Image.fromarray(picture).save(content, "png", pnginfo=about)
     write_output(path, content.getvalue())
+
+
+def is_saved_picture(path: Path) -> bool:
+    """Whether ``save_picture`` wrote a file."""
+    with suppress(UntrustedError):
+        return f"tEXtSoftware\0{SOFTWARE}".encode() in read_bytes(path)
+    return False
 
 
 def save_sample(picture: NDArray[np.uint8], path: Path | BinaryIO) -> None:

@@ -23,7 +23,7 @@ from cubestack.host.cli.arguments import add_flag, add_output, add_path, add_val
 from cubestack.host.clients.quaternions import pointing_deg
 from cubestack.host.devices.registry import device, device_names
 from cubestack.host.emulation.emulated import open_device
-from cubestack.host.pictures.images import SKY, save_picture, stretched
+from cubestack.host.pictures.images import SKY, is_saved_picture, save_picture, stretched
 from cubestack.host.terminal import say
 
 ANGLES = {
@@ -41,7 +41,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--mag-limit", type=float, metavar="V", help="only brighter stars")
     add_value(parser, "seed", whole(0, "of the noise (default 0)", 0))
     add_flag(parser, "--stretched", "lift faint stars for the eye; not for uploads")
-    add_output(parser, "--out", "image to write", "FILE.png", required=True)
+    meaning = "image to write; replaces an earlier one of this command"
+    add_output(parser, "--out", meaning, "FILE.png", required=True, renews=is_saved_picture)
 
 
 def run(args: argparse.Namespace) -> int:

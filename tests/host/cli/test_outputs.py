@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from PIL import Image
 
 import cubestack.host
 from cubestack.host.cli.main import make_parser
@@ -247,3 +248,13 @@ def _writes(node: ast.AST) -> bool:
     modes = [one.value for one in node.args if isinstance(one, ast.Constant)]
     opens = name == "open" and any(isinstance(one, str) and set(one) & set("wxa") for one in modes)
     return name in ("write_text", "write_bytes") or opens
+
+
+def test_picture_renews_only_what_it_has_rendered(run: Run, tmp_path: Path) -> None:
+    out, words = tmp_path / "p.png", ("--ra", "84", "--dec", "-1")
+    assert run("picture", "aramis", *words, "--out", str(out)).code == 0
+    first = out.read_bytes()
+    assert run("picture", "aramis", *words, "--roll", "90", "--out", str(out)).code == 0
+    assert out.read_bytes() != first
+    Image.open(out).save(out, "png")  # by another program
+    assert "exists; choose another" in run("picture", "aramis", *words, "--out", str(out)).err
