@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.aramis.arrays import Floats
-from cubestack.firmware_model.attitude.lens_doubt import DOUBT
 from cubestack.firmware_model.interface.aramis import MeasurementOutcome, Reason
 from cubestack.firmware_model.star_tracker.quality import Rating, SkyStatistics
 from cubestack.firmware_model.values import DeclaredValues, choice, flag, number, whole
@@ -79,7 +78,7 @@ class Profile(DeclaredValues):
         1.8, "the same where the turn about the boresight is too uncertain", 0, 1000
     )
     lens_doubt: float = number(
-        DOUBT, "probability that the lens is not as described, before the picture", 0, 1
+        0.0, "probability that the lens is not as described, before the picture", 0, 1
     )
     motion_sigma_rad: float = number(7e-4, "uncertainty that is too much then", 0, 0.1)
 

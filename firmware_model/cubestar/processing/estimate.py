@@ -44,6 +44,11 @@ SCALED = 2e-3
 EXCESS = 2.2
 
 
+#: Probability that the lens is not as described. 0: it is believed. With more, a tracker whose lens
+#: is known to the uncertainties of a calibration refuses whole nights (docs/identification.md).
+LENS_DOUBT = 0.0
+
+
 @dataclass(frozen=True, eq=False)
 class Estimate:
     """An attitude (4,), its number of stars, and its rating, if any."""
@@ -89,6 +94,7 @@ def by_errors(
             (camera.cx, camera.cy),
             fit,
             meter,
+            LENS_DOUBT,
         )
         refused = lens.is_refused
         fit = replace(fit, quaternion=lens.quaternion, covariance=lens.covariance)

@@ -188,12 +188,13 @@ def test_temporary_defect_affects_the_lines_of_its_time(star: Star) -> None:
 
 
 @pytest.mark.fault("blooming")
-def test_blooming_prevents_identification(star: Star, good: np.ndarray) -> None:
-    outcome = star.capture_with("blooming", threshold=40, length=20)
-    assert outcome == ("IDENTIFICATION_FAILED", {"LessThanThreeStarsID"})
+def test_blooming_prevents_an_attitude(star: Star, good: np.ndarray) -> None:
+    length = 60
+    outcome = star.capture_with("blooming", threshold=40, length=length)
+    assert outcome == ("CALCULATION_FAILED", {"QuestindexError"})
     expected = good.copy()
     for y, x in np.argwhere(good >= 40):
-        expected[max(0, y - 20) : y + 21, x] = 255
+        expected[max(0, y - length) : y + length + 1, x] = 255
     np.testing.assert_array_equal(star.stored, expected)
     assert star.capture()[0] == "CALCULATED"
 

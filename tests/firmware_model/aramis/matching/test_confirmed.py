@@ -16,6 +16,7 @@ from cubestack.firmware_model.aramis.matching.identification import identify
 from cubestack.firmware_model.aramis.matching.shutter import FEWEST, at_middle_row
 from cubestack.firmware_model.aramis.pipeline import VERIFIED
 from cubestack.firmware_model.aramis.solution import Profile, Solution, StarList
+from cubestack.firmware_model.attitude.lens_doubt import DOUBT
 from cubestack.firmware_model.attitude.quest import AttitudeError
 from cubestack.firmware_model.interface.aramis import MeasurementOutcome, Reason
 
@@ -49,8 +50,8 @@ def test_confirmed_attitude_errors_match_the_reported_sigma(noise_px: float) -> 
 
 def test_doubt_about_the_lens_widens_the_reported_sigma() -> None:
     for made in pictures(5, 7):
-        sure = found(made, profile=replace(PROFILE, lens_doubt=0.0)).rating
-        doubting = found(made).rating
+        sure = found(made).rating
+        doubting = found(made, profile=replace(PROFILE, lens_doubt=DOUBT)).rating
         assert sure is not None
         assert doubting is not None
         assert np.all(doubting.sigma_rad[:2] > sure.sigma_rad[:2])
