@@ -154,9 +154,9 @@ def parse_toml(text: str, name: str, error: Refusal = UntrustedError) -> dict[st
     return table
 
 
-def read_json(path: Path, error: Refusal = UntrustedError) -> Any:
-    """The value of a JSON file; raises as ``opened``."""
-    return parse_json(read_text(path, error=error), str(path), error)
+def read_json(path: Path, error: Refusal = UntrustedError, *, finite: bool = True) -> Any:
+    """The value of a JSON file, as ``parse_json``; raises as ``opened``."""
+    return parse_json(read_text(path, error=error), str(path), error, finite=finite)
 
 
 def parse_json(

@@ -79,7 +79,7 @@ def load_camera(path: Path) -> Camera:
     CameraFileError (a ValueError).
     """
     try:
-        content = read_json(path, CameraFileError)
+        content = read_json(path, CameraFileError, finite=False)  # checked below, by key
     except OSError as error:
         raise CameraFileError(f"{path}: {error.strerror}; give a JSON camera file") from error
     keys = content.get("camera", content) if isinstance(content, dict) else content

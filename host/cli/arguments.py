@@ -103,8 +103,12 @@ class Parser(argparse.ArgumentParser):
             if path is None or inside is None or parsed.force:
                 continue
             place = path / inside
-            if place.is_file() and not action.renews(place):  # type: ignore[attr-defined]
-                option = action.option_strings[0]
+            option = action.option_strings[0]
+            try:
+                exists = place.is_file()
+            except OSError as error:  # such as a name that is too long
+                self.error(f"{option}: can not write {place}: {error.strerror}")
+            if exists and not action.renews(place):  # type: ignore[attr-defined]
                 self.error(f"{option}: {place} exists; choose another, or replace it with {FORCE}")
 
     def format_help(self) -> str:

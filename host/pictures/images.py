@@ -81,7 +81,7 @@ def save_picture(picture: NDArray[np.uint8], path: Path) -> None:
 
 def is_saved_picture(path: Path) -> bool:
     """Whether ``save_picture`` wrote a file."""
-    with suppress(UntrustedError):
+    with suppress(UntrustedError, OSError):
         return f"tEXtSoftware\0{SOFTWARE}".encode() in read_bytes(path)
     return False
 

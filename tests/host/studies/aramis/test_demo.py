@@ -146,4 +146,4 @@ def test_catalogue_command_prints_text(run: Run) -> None:
 
 def test_names_an_output_that_cannot_be_written(tmp_path: Path, run: Run) -> None:
     outcome = run("catalogue", "aramis", *SMALL, "--output", tmp_path / "no" / "x")
-    assert (outcome.code, str(tmp_path / "no" / "x") in outcome.line) == (1, True)
+    assert (outcome.code, str(tmp_path / "no" / "x") in outcome.line) == (2, True)
