@@ -53,9 +53,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     span = _span(args)
     recording = load_recording(args.recording)
-    setup = setup_for(recording, seed=args.seed, scene=args.scene, faults=args.faults, tell=say)
+    given = given_options(args)
+    setup = setup_for(
+        recording, seed=args.seed, scene=args.scene, faults=args.faults, tell=say, given=given
+    )
     with Outputs() as stack:
-        opened = Recipe.of(recording, setup, given_options(args)).make(args.engine)
+        opened = Recipe.of(recording, setup, given).make(args.engine)
         stack.callback(opened.close)
         whole = argparse.Namespace(record=args.record, trace=None if span else args.trace)
         record(whole, opened, stack, setup)

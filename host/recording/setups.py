@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from importlib.metadata import version
 from pathlib import Path
+from types import MappingProxyType
 
 from cubestack.firmware_model.formats.recording import Recording
 from cubestack.firmware_model.formats.setup import Document, Option, Setup
@@ -49,10 +50,12 @@ def setup_for(
     scene: Path | None,
     faults: Path | None,
     tell: Callable[[str], None],
+    given: Mapping[str, Option] = MappingProxyType({}),
 ) -> Setup:
     """Set-up for a replay: the recorded one, with replacements.
 
-    ``tell`` gets a line for each difference.
+    ``tell`` gets a line for each difference. Recorded files of options that are ``given`` anew
+    are left out.
     """
     recorded = recording.setup
     if recorded is None:
@@ -63,12 +66,19 @@ def setup_for(
         tell(f"{recording.name} was made by version {recorded.version} of {DISTRIBUTION}")
     if seed is not None and seed != recorded.seed and not recorded.target:
         tell(f"seed {seed} instead of {recorded.seed}, with which it was recorded")
+    replaced = {
+        split_mark(str(options[name]))[0].name
+        for options in (recorded.options, given)
+        for name in given
+        if name in options
+    }
     return Setup(
         version(DISTRIBUTION),
         seed=recorded.seed if seed is None else seed,
         scene=_chosen("scene", scene, recorded.scene, tell),
         faults=_chosen("plan of faults", faults, recorded.faults, tell),
         options=recorded.options,
+        files={name: one for name, one in recorded.files.items() if name not in replaced},
     )
 
 

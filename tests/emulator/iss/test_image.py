@@ -217,7 +217,7 @@ def test_error_of_a_bad_file_is_one_line_with_its_path(tmp_path, name):
 def test_missing_file_and_folder_are_errors(tmp_path):
     with pytest.raises(ImageError, match=r"none\.elf: No such file or directory$"):
         load_image(tmp_path / "none.elf")
-    with pytest.raises(ImageError, match="is a folder, not a regular file$"):
+    with pytest.raises(ImageError, match=r"is a folder, not a regular file$"):
         load_image(tmp_path)
 
 

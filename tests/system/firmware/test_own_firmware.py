@@ -1,3 +1,4 @@
+from base64 import b64encode
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -186,8 +187,16 @@ def test_replay_checks_the_hash_of_the_firmware(
         answer(star, b"h")
         recorder.close()
     assert main(["replay", str(recording)]) == 0
-    changed = program.read_bytes().replace(b"hello", b"jello")
+    original = program.read_bytes()
+    changed = original.replace(b"boot", b"root")
     program.write_bytes(changed)
+    assert main(["replay", str(recording)]) == 0  # the recording contains the program
+    assert main(["replay", str(recording), "--firmware", str(program)]) == 1
+    capsys.readouterr()
+    inside, other = (b64encode(one).decode() for one in (original, changed))
+    text = recording.read_text("utf-8")
+    assert inside in text
+    recording.write_text(text.replace(inside, other), "utf-8")
     assert main(["replay", str(recording)]) == 2
     assert "has the hash" in capsys.readouterr().err
 
