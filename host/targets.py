@@ -282,7 +282,14 @@ def _registers(
     return None if registers is None else RegisterClient(bus, registers, wait=wait)
 
 
-def _open_i2c(text: str, name: str | None, tape: HostRecorder | None) -> Target:
+def device_at(text: str, name: str | None) -> AnyDevice:
+    """The device at a serial line or bus: ``name``, or the one with the I2C address in ``text``;
+    raises TargetError if neither tells it."""
+    return _parse_i2c(text, name)[2] if text.startswith(I2C) else device_of(name, text)
+
+
+def _parse_i2c(text: str, name: str | None) -> tuple[int, int | None, AnyDevice]:
+    """Number of the bus, address if it is given, and device."""
     bus_text, _, address_text = text.removeprefix(I2C).partition(":")
     try:
         number = int(bus_text)
@@ -292,7 +299,11 @@ def _open_i2c(text: str, name: str | None, tape: HostRecorder | None) -> Target:
     if number < 0 or (address is not None and not 0x08 <= address <= 0x77):
         raise TargetError(f"{text}: must be i2c:BUS:ADDR, as in i2c:7:0x1a (0x08 to 0x77)")
     found = (known.name for known in devices() if address in _addresses(known.interface))
-    owner = device_of(name or next(found, None), text)
+    return number, address, device_of(name or next(found, None), text)
+
+
+def _open_i2c(text: str, name: str | None, tape: HostRecorder | None) -> Target:
+    number, address, owner = _parse_i2c(text, name)
     interface = owner.interface
     opened = _open_bus(number)
     bus: I2cBus = opened if tape is None else tape.bus(opened)

@@ -18,7 +18,6 @@ import threading
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cubestack.firmware_model.values import whole
@@ -32,7 +31,7 @@ from cubestack.host.cli.device_options import (
 from cubestack.host.cli.ports import LAST_PORT
 from cubestack.host.devices.registry import device_names
 from cubestack.host.errors import TargetError
-from cubestack.host.targets import EMULATED, FORMS, device_of, open_target
+from cubestack.host.targets import EMULATED, FORMS, device_at, open_target
 from cubestack.host.terminal import say
 
 if TYPE_CHECKING:
@@ -63,7 +62,7 @@ def run(args: argparse.Namespace) -> int:
 
     ended = threading.Event()
     options = _options(args)
-    _check(args.targets, args.device, options, args.record)
+    _check(args, options)
     with ExitStack() as stack:
         pool = stack.enter_context(ThreadPoolExecutor(len(args.targets)))
         sessions = [pool.submit(_open, text, options, args) for text in args.targets]
@@ -83,10 +82,9 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _check(
-    targets: Sequence[str], device: str | None, options: Mapping[str, Any], record: Path | None
-) -> None:
+def _check(args: argparse.Namespace, options: Mapping[str, Any]) -> None:
     """TargetError for a device that can not be emulated, and options that are for none."""
+    targets, record = args.targets, args.record
     emulated = [one.removeprefix(EMULATED) for one in targets if one.startswith(EMULATED)]
     for name in emulated:
         if name not in device_names():
@@ -95,8 +93,8 @@ def _check(
     from cubestack.host.ground.playback import is_recording
 
     for text in targets:
-        if not text.startswith(EMULATED) and not is_recording(text):
-            device_of(device, text)
+        if not text.startswith(EMULATED) and not is_recording(text) and args.control is None:
+            device_at(text, args.device)  # a control port tells its device
     if options and not emulated:
         from cubestack.host.ground.emulators import words
 

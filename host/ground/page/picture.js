@@ -109,6 +109,7 @@ export class Pictures {
     }
     const { rows, columns, stored } = pictures[this.name.value] ?? {};
     if (rows) this.zoomFrame.place.style.setProperty("--aspect", columns / rows);
+    if (rows && !this.pixels) Object.assign(this.canvas, { width: columns, height: rows }); // its place until it comes
     this.showEmpty(!stored);
     if (!stored) this.value.textContent = rows ? `${this.name.value}: ${columns} x ${rows}, no image since power-up` : "";
     else if (changed.includes(this.name.value)) this.fetch();
