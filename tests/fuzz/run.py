@@ -9,7 +9,6 @@ that fail are kept, by default in out/fuzz, and tried first the next time.
 import argparse
 import random
 import re
-import resource
 import sys
 import tempfile
 import time
@@ -216,6 +215,12 @@ def _spliced(one: bytes, other: bytes, chance: random.Random) -> bytes:
     return one[:at] + other[there:]
 
 
+def _most_memory() -> int:
+    """Largest use of memory by this program, in bytes; not what started it, as `getrusage` has."""
+    (line,) = re.findall(r"^VmHWM:\s*(\d+) kB$", Path("/proc/self/status").read_text(), re.M)
+    return int(line) << 10
+
+
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--minutes", type=float, default=1.0)
@@ -232,7 +237,7 @@ def main(arguments: list[str] | None = None) -> int:
                 fuzzer.attempt(name, document)
         for number, name in enumerate(names):
             fuzzer.run(name, time.monotonic() + 60 * args.minutes / len(names), args.seed + number)
-    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss << 10
+    memory = _most_memory()
     for name in names:
         accepted, rejected = (fuzzer.counts[name, one] for one in ("accepted", "rejected"))
         print(f"{name}: {accepted + rejected} documents, {rejected} rejected")
