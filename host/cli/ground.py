@@ -16,7 +16,7 @@ import argparse
 import signal
 import threading
 from collections.abc import Mapping, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import FIRST_EXCEPTION, Future, ThreadPoolExecutor, wait
 from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any
 
@@ -40,6 +40,9 @@ if TYPE_CHECKING:
 
 LOOK_S = 0.5
 """Wall time from one look at whether it is to end to the next."""
+
+REFUSED_S = 10.0
+"""Longest wall time that the page's address waits for the devices to open."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -70,6 +73,8 @@ def run(args: argparse.Namespace) -> int:
         token = new_token()
         serving = Serving(Guard(page_app(sessions), token), LOOPBACK, args.port)
         stack.enter_context(serving.running())
+        for session in wait(sessions, REFUSED_S, FIRST_EXCEPTION).done:
+            session.result()  # a wrong call is refused before the page has an address
         address = f"{serving.url}/?token={token}"
         print(f'{{"page": "{address}"}}' if args.json else f"the page: {address}", flush=True)
         for session in sessions:
