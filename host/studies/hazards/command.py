@@ -67,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
     if args.list:
         _list()
         return 0
-    names = [args.device] if args.device else curves.devices_with_hazards()
+    names = curves.devices_with_hazards() if args.device is None else [args.device]
     jobs = [
         job
         for name in names
