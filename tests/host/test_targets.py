@@ -9,7 +9,7 @@ from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.host import targets
 from cubestack.host.clients.i2c import I2cClient
 from cubestack.host.errors import PortOpenError, RecordingMismatchError, TargetError
-from cubestack.host.targets import open_target
+from cubestack.host.targets import device_at, open_target
 from cubestack.host.transport.streams import Transport
 
 
@@ -47,6 +47,19 @@ def write(path, events) -> None:
         writer = recording.RecordingWriter(stream, "cubesense", bauds)
         for event in events:
             writer.write(event)
+
+
+@pytest.mark.parametrize(
+    ("text", "device", "name"),
+    [
+        ("i2c:7:0x1a", None, "cubestar"),
+        ("i2c:7:0x1c", None, "cubesense"),
+        ("i2c:7:0x20", "aramis", "aramis"),
+        ("/dev/ttyUSB0", "cubestar", "cubestar"),
+    ],
+)
+def test_address_or_option_names_the_device(text, device, name):
+    assert device_at(text, device).name == name
 
 
 def test_recording_names_its_device(tmp_path):
