@@ -1,6 +1,7 @@
 """Lenses that differ from the one that the firmware assumes: out of focus, longer, distorted."""
 
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
@@ -92,7 +93,7 @@ class LensResiduals(SensorHazard):
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Misdescribed(SensorHazard):
+class _Misdescribed(SensorHazard, ABC):
     """A lens whose camera file is wrong in one respect."""
 
     @classmethod
@@ -101,9 +102,9 @@ class _Misdescribed(SensorHazard):
         signed: dict[str, Any] = {cls.strength.key: strength * float(generator.choice([-1, 1]))}
         return replace(one, **signed)
 
+    @abstractmethod
     def displacement(self, lens: Lens) -> Displacement:
-        """What it does to the picture."""
-        raise NotImplementedError
+        """What it does to the picture, in px."""
 
     def lens(self, lens: Lens, temperature_c: float) -> Lens:
         del temperature_c
