@@ -116,13 +116,12 @@ class PtyEndpoint(SerialPort):
             watched.append((self._master, self._events(reading=True)))
         return watched
 
-    def exchange(self, now_ps: int) -> None:
-        """Also notices a client that has followed another one since the last exchange."""
+    def _meet(self) -> None:
+        """Begin with a client that has followed another one since the last look."""
         self._notice()
         if self._ended and not self._hung_up():
             self._ended = False
             self._renew(keep=read_settings(self._master) != self._seen)
-        super().exchange(now_ps)
 
     def _notice(self) -> None:
         if self._openings and self._openings.ended():
@@ -142,6 +141,7 @@ class PtyEndpoint(SerialPort):
         return bool(poll_now(self._master, 0) & select.POLLHUP)
 
     def _find_client(self) -> object | None:
+        self._meet()
         hung_up = self._hung_up()
         settings = read_settings(self._master)
         # A client may come and go between two exchanges, and leave other settings.
@@ -162,6 +162,8 @@ class PtyEndpoint(SerialPort):
             if error.errno not in (errno.EAGAIN, errno.EIO):  # EIO: hung up, and nothing is left
                 raise
             return b""
+        # Only now, so that the answers to what a new client wrote are its own.
+        self._meet()
         if data and (self._strict or not self._reported):
             self._apply_format(reported=self._reported)
         return data

@@ -2,13 +2,17 @@
 
 import contextlib
 import fcntl
+import itertools
 import os
 import select
 import socket
 import struct
 import subprocess
+import sys
 import termios
 import tty
+from collections.abc import Callable
+from types import FrameType
 from typing import Any
 
 import pytest
@@ -305,6 +309,50 @@ def test_pty_client_that_follows_at_once_is_a_new_one(device, path, own):
         os.close(second)
     finally:
         port.close()
+
+
+def test_pty_answers_a_client_that_follows_at_any_line_of_an_exchange(device, path):
+    device.answers = 1
+    with contextlib.closing(PtyEndpoint(path, device.uart)) as port:
+        clients = [open_client(port)]
+        port.exchange(device.advance(10))
+
+        def follow() -> None:
+            clients.pop().close()
+            clients.append(open_client(port))
+            clients[0].write(ALL_BYTES)
+
+        moment = 0
+        while happens_at_line(moment, follow, lambda: port.exchange(device.advance(10))):
+            for _ in range(30):
+                port.exchange(device.advance(10))
+            assert clients[0].read(len(ALL_BYTES)) == ALL_BYTES, moment
+            moment += 1
+        assert moment > 20
+        clients[0].close()
+
+
+def happens_at_line(number: int, act: Callable[[], None], call: Callable[[], None]) -> bool:
+    """Whether ``call`` comes to its ``number``-th line in the ports; ``act`` is done there."""
+    lines = itertools.count()
+    done = False
+
+    def trace(frame: FrameType, event: str, _argument: object) -> Any:
+        nonlocal done
+        if "/emulator/ports/" not in frame.f_code.co_filename:
+            return None
+        if event == "line" and next(lines) == number:
+            done = True
+            act()
+        return trace
+
+    before = sys.gettrace()
+    sys.settrace(trace)
+    try:
+        call()
+    finally:
+        sys.settrace(before)
+    return done
 
 
 @a_pty
