@@ -24,6 +24,7 @@ export class Pictures {
     });
     this.changed_s = {};
     this.detected = NONE;
+    this.detecting = 0; // number of the latest request, the only one whose answer is shown
     this.pending = false; // whether detections are read when the device is not busy
     this.name = choose([], { id: "picture-name", onchange: () => this.fetch() });
     const checkbox = (id, onchange) =>
@@ -49,6 +50,7 @@ export class Pictures {
       key("fitted", "fitted"),
     );
     this.value = make("span", { id: "picture-value" });
+    this.found = make("span", { id: "found" });
     this.empty = make("p", { id: "no-picture" });
     this.empty.textContent = controls
       ? `The image stays in the device: download it under "Commands". Here, ${controls}.`
@@ -69,7 +71,7 @@ export class Pictures {
       ),
     );
     const bar = row(this.take, ...this.zoomFrame.buttons);
-    const caption = make("p", { id: "caption", className: "quiet" }, this.value, this.hidden);
+    const caption = make("p", { id: "caption", className: "quiet" }, this.value, this.found, this.hidden);
     place.append(bar, this.zoomFrame.place, this.legend, caption, this.options);
   }
 
@@ -104,8 +106,7 @@ export class Pictures {
     for (const name of changed) this.changed_s[name] = at(name);
     if (changed.length) {
       this.pending = true; // what it finds in a new picture comes when it is done with that
-      this.detected = NONE;
-      this.legend.style.visibility = "hidden";
+      this.clearDetections();
     }
     const { rows, columns, stored } = pictures[this.name.value] ?? {};
     if (rows) this.zoomFrame.place.style.setProperty("--aspect", columns / rows);
@@ -116,19 +117,28 @@ export class Pictures {
     else if (this.pending && !busy) this.detect();
   }
 
+  clearDetections() {
+    this.detecting += 1;
+    this.detected = NONE;
+    this.found.textContent = "";
+    this.legend.style.visibility = "hidden";
+  }
+
   async detect() {
     this.pending = false;
-    this.detected = NONE;
-    this.legend.style.visibility = "hidden";
-    if (this.detections.checked)
-      try {
-        this.detected = await ask(`${this.path}/detections/${encodeURIComponent(this.name.value)}`);
-        this.value.textContent = counted(this.detected.marks);
-        this.legend.style.visibility = "";
-      } catch (error) {
-        this.value.textContent = error.message;
-      }
+    this.clearDetections();
     this.drawOverlay();
+    if (!this.detections.checked) return;
+    const number = this.detecting;
+    const show = (text, detected = NONE) => {
+      if (number !== this.detecting) return; // a later request, or another image
+      this.detected = detected;
+      this.found.textContent = text;
+      this.legend.style.visibility = detected === NONE ? "hidden" : "";
+      this.drawOverlay();
+    };
+    const path = `${this.path}/detections/${encodeURIComponent(this.name.value)}`;
+    await ask(path).then((answer) => show(counted(answer.marks), answer), (error) => show(error.message));
   }
 
   async fetch() {
@@ -172,7 +182,7 @@ export class Pictures {
     const hidden = this.zoomFrame.drawOver((pen, place, size) =>
       drawDetections(pen, this.detected, place, size, this.magnitudes.checked),
     );
-    this.hidden.textContent = hidden ? `; names hidden: ${hidden}; zoom in to read them` : "";
+    this.hidden.textContent = hidden ? `names hidden: ${hidden}; zoom in to read them` : "";
   }
 
   point(event) {

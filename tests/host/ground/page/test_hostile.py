@@ -108,6 +108,11 @@ def test_answers_are_escaped(page: Any) -> None:
     page.uncheck("#detections")
     page.check("#detections")
     page.wait_for_selector("#picture >> text=/1 detected, 1 identified/")
+    before = page.inner_text("#time")
+    page.wait_for_function(
+        "before => document.querySelector('#time').textContent !== before", arg=before
+    )
+    assert page.inner_text("#found") == "1 detected, 1 identified"  # updates leave it
     for path in ("shell", "pause", "sensor-registers/*", "detections/*", "download"):
         page.route(f"**/{path}", lambda route: route.fulfill(status=400, json={"error": HOSTILE}))
     before = page.locator("#lines li.bad").count()
