@@ -12,10 +12,12 @@ import fcntl
 import io
 import os
 import stat
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import TracebackType
+from typing import TypeAlias
 
 PART = ".{}.part"
 """Name of a file that is not kept yet."""
@@ -68,6 +70,12 @@ class OutputFile(io.TextIOWrapper):
         self._part.replace(self._place)
         self._part = None
 
+    def drop(self) -> None:
+        """Leave what is there, unless the file is kept already; nothing more is written."""
+        if self._part is not None:
+            self._part.unlink(missing_ok=True)
+            self._part = None
+
     def end(
         self,
         kind: type[BaseException] | None,
@@ -79,8 +87,7 @@ class OutputFile(io.TextIOWrapper):
             if kind is None:
                 self.keep()
         finally:
-            if self._part is not None:
-                self._part.unlink(missing_ok=True)
+            self.drop()
             with contextlib.suppress(OSError):  # nobody will see the file, or knows already
                 self.close()
 
@@ -110,14 +117,55 @@ class Outputs(ExitStack):
         for file in self._files:
             file.keep()
 
+    def drop(self) -> None:
+        """Leave the files that were there, unless these are kept already."""
+        for file in self._files:
+            file.drop()
+
+
+Files: TypeAlias = Mapping[str, str | bytes]
+"""Contents by path in a folder."""
+
 
 def write_output(path: Path, content: str | bytes) -> None:
     """Write a whole file; raises ValueError if that is not possible."""
+    write_outputs(path.parent, {path.name: content})
+
+
+def write_outputs(folder: Path, files: Files) -> None:
+    """Write whole files into a folder that exists: all or, with a ValueError, none."""
     with Outputs() as outputs:
-        file = outputs.create(path)
+        for name, content in files.items():
+            file = outputs.create(folder / name)
+            try:
+                file.buffer.write(content.encode() if isinstance(content, str) else content)
+                file.flush()
+            except OSError as error:
+                raise ValueError(f"can not write {folder / name}: {error.strerror}") from None
+
+
+def output_folder(path: Path) -> Path:
+    """Create a folder unless it exists; raises ValueError if that is not possible."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ValueError(f"can not write {path}: {error.strerror}") from None
+    return path
+
+
+def write_new_folder(path: Path, files: Files) -> None:
+    """Write a folder that does not exist yet; raises ValueError if it does, or can not be."""
+    if path.exists():
+        raise ValueError(f"{path} exists; remove it, or choose another folder with --out")
+    place = Path(os.path.realpath(path))
+    output_folder(place.parent)
+    with TemporaryDirectory(prefix=f".{place.name}.", dir=place.parent) as scratch:
+        whole = Path(scratch) / place.name
+        for name in files:
+            output_folder((whole / name).parent)
+        write_outputs(whole, files)
         try:
-            file.buffer.write(content.encode() if isinstance(content, str) else content)
-            file.flush()
+            whole.rename(place)
         except OSError as error:
             raise ValueError(f"can not write {path}: {error.strerror}") from None
 

@@ -68,6 +68,16 @@ class Target:
     device: AnyDevice | None = None  #: its declaration; None for an unregistered interface
     recorded: Path | None = None  #: file with the session so far, or None
     on_close: list[Callable[[], None]] = field(default_factory=list)
+    outputs: Outputs = field(default_factory=Outputs)  #: the recording
+
+    def __enter__(self) -> Target:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        """Close it; if the call was wrong, an earlier recording that is not replaced yet stays."""
+        if kind is not None and issubclass(kind, ValueError):
+            self.outputs.drop()
+        self.close()
 
     def close(self) -> None:
         for callback in reversed(self.on_close):
@@ -95,6 +105,7 @@ def open_target(
     record: Path | None = None,
     control: str | None = None,
     options: Mapping[str, Any] | None = None,
+    keep: bool = True,
 ) -> Target:
     """Open the target that ``text`` names.
 
@@ -111,6 +122,7 @@ def open_target(
         record: file for a recording of the session; an emulated device is recorded at its pins.
         control: control port of the process that emulates the device.
         options: of an emulated device's board, its profile among them.
+        keep: give the recording its name at once; if not, `Target.outputs` keeps it, or drops it.
 
     Raises:
         TargetError: the text names no target, or not the device.
@@ -127,7 +139,7 @@ def open_target(
     if text.startswith(EMULATED):
         if service_port is not None:
             raise TargetError(f"{text} has its bench protocol already: leave out --bench")
-        return _open_emulated(text, baud, scene, seed, engine, record, options or {})
+        return _open_emulated(text, baud, scene, seed, engine, record, options or {}, keep)
     given = {"scene": scene is not None, "engine": engine != "auto"}
     for name in (*(name for name, here in given.items() if here), *(options or {})):
         raise TargetError(f"--{name} is for emulated:DEVICE, not for {text}")
@@ -143,7 +155,9 @@ def open_target(
             owner = device if controls is None else controls.device
             target = _open_real(text, owner, service_port, backup, baud, tape)
             target.controls, target.recorded = controls, record
-        stack.keep()
+        if keep:
+            stack.keep()
+        target.outputs = stack
         target.on_close.insert(0, stack.pop_all().close)
         return target
 
@@ -156,6 +170,7 @@ def _open_emulated(
     engine: Engine,
     record: Path | None,
     options: Mapping[str, Any],
+    keep: bool,
 ) -> Target:
     name = text.removeprefix(EMULATED).lower()
     if name not in device_names():
@@ -170,7 +185,8 @@ def _open_emulated(
             setup = emulated_setup(seed, scene, options=options)
             recorder = start_recorder(emulated, create_record(record, stack), setup)
             stack.callback(recorder.close)
-            stack.keep()
+            if keep:
+                stack.keep()
         lines = [board.serial(line.name) for line in board.lines]
         bus = board.i2c()
         has_node = board.lines[0].has_node
@@ -184,6 +200,7 @@ def _open_emulated(
             controls=controls,
             device=emulated.device,
             on_close=[stack.pop_all().close],
+            outputs=stack,
         )
 
 

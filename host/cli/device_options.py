@@ -245,8 +245,8 @@ def add_target_arguments(parser: argparse.ArgumentParser) -> None:
     add_output(parser, "--record", "record the session to FILE")
 
 
-def open_any_target(text: str, args: argparse.Namespace) -> Target:
-    """Open the target ``text`` with these options; raises what ``open_target`` does."""
+def open_any_target(text: str, args: argparse.Namespace, *, keep: bool = True) -> Target:
+    """Open the target ``text`` with these options; ``keep`` and errors as of ``open_target``."""
     options = given_options(args)
     with busy(f"opening {text}"):
         target = open_target(
@@ -261,6 +261,7 @@ def open_any_target(text: str, args: argparse.Namespace) -> Target:
             record=args.record,
             control=args.control,
             options=options,
+            keep=keep,
         )
     if target.device is not None:
         show_notices(target.device, options, say)

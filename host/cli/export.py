@@ -17,7 +17,7 @@ examples:
 """
 
 import argparse
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
 from cubestack.firmware_model.interface.codec.message import Interface
 from cubestack.firmware_model.interface.efm32gg.table import Processor
@@ -30,7 +30,7 @@ from cubestack.host.export.processor import processor_header, svd
 from cubestack.host.export.python_module import python_module
 from cubestack.host.export.wireshark import wireshark
 from cubestack.host.export.xtce import xtce
-from cubestack.host.output import write_output
+from cubestack.host.output import write_new_folder, write_output
 
 #: Exporter of an interface by format.
 OF_INTERFACE: dict[str, Callable[[Interface], str]] = {
@@ -63,7 +63,9 @@ def run(args: argparse.Namespace) -> int:
     if args.format not in OF_PROCESSOR and not found.interface.messages:
         raise ValueError(f"{found.name} has no messages; choose {' or '.join(OF_PROCESSOR)}")
     if args.format in TO_FOLDER:
-        _write_folder(TO_FOLDER[args.format](found.interface), args)
+        if args.out is None:
+            raise ValueError(f"{args.format} is a folder; name one with --out")
+        write_new_folder(args.out, TO_FOLDER[args.format](found.interface))
         return 0
     if args.format in OF_INTERFACE:
         text = OF_INTERFACE[args.format](found.interface)
@@ -78,15 +80,3 @@ def run(args: argparse.Namespace) -> int:
     else:
         write_output(args.out, text)
     return 0
-
-
-def _write_folder(files: Mapping[str, str], args: argparse.Namespace) -> None:
-    """Write texts by path; ValueError without a folder, or for one that exists."""
-    if args.out is None:
-        raise ValueError(f"{args.format} is a folder; name one with --out")
-    if args.out.exists():
-        raise ValueError(f"--out {args.out} exists; remove it, or choose another folder")
-    for path, text in files.items():
-        place = args.out / path
-        place.parent.mkdir(parents=True, exist_ok=True)
-        place.write_text(text, encoding="utf-8")

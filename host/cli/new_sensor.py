@@ -18,6 +18,7 @@ from pathlib import Path
 from cubestack.host.cli.arguments import add_path
 from cubestack.host.devices.device import check_name
 from cubestack.host.devices.registry import device_names, devices
+from cubestack.host.output import write_new_folder
 from cubestack.host.terminal import tell
 
 FILES = {
@@ -45,13 +46,10 @@ def run(args: argparse.Namespace) -> None:
         raise ValueError(f"{name} is a device already; choose another name")
     if find_spec(name) is not None:
         raise ValueError(f"{name} is a Python module already; choose another name")
-    if folder.exists():
-        raise ValueError(f"{folder} exists; remove it, or choose another with --out")
-    for path, text in rendered(name):
-        place = folder / path
-        place.parent.mkdir(parents=True, exist_ok=True)
-        place.write_text(text, encoding="utf-8")
-        tell(str(place))
+    written = dict(rendered(name))
+    write_new_folder(folder, written)
+    for path in written:
+        tell(str(folder / path))
     tell(f"install it: pip install --no-build-isolation -e {folder}")
 
 

@@ -49,12 +49,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     lines = _lines(args)
-    target = open_any_target(args.target, args)
-    try:
+    with open_any_target(args.target, args, keep=False) as target:
         shell = Shell(target)
-        show = (lambda result: print(json.dumps(result.data))) if args.json else _show_text
-        shell.on_row = (lambda _result: None) if args.json else show
+
+        def show(result: CommandResult) -> None:
+            target.outputs.keep()  # the first command was right
+            if args.json:
+                print(json.dumps(result.data))
+            else:
+                _show_text(result)
+
+        shell.on_row = (lambda _row: target.outputs.keep()) if args.json else show
         if lines is None and sys.stdin.isatty():
+            target.outputs.keep()
             return _interactive(shell, show)
         for line in lines if lines is not None else sys.stdin:
             if line.strip() in ("quit", "exit"):
@@ -63,8 +70,6 @@ def run(args: argparse.Namespace) -> int:
             if result is not None:
                 show(result)
         return 0
-    finally:
-        target.close()
 
 
 def _lines(args: argparse.Namespace) -> list[str] | None:

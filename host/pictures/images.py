@@ -1,7 +1,6 @@
 """Pictures for people: grey values stretched and as PNG, marked stars, arrows of residuals."""
 
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -10,16 +9,11 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
-from PIL.PngImagePlugin import PngInfo
 
-from cubestack.firmware_model.formats.untrusted import UntrustedError, read_bytes
 from cubestack.host.clients.contract import FoundStar
-from cubestack.host.output import write_output
+from cubestack.host.pictures.files import CALIBRATE, DEMO, save_png
 from cubestack.host.pictures.overlay import star_name
 from cubestack.host.pictures.sheet import GRID, TRUTH, Entry, Lens, Sheet
-
-SOFTWARE = "cubestack picture"
-"""Text of that name in the pictures of ``save_picture``."""
 
 FEWEST_COUNTS = 24
 """Range of grey values that is stretched to the whole, at least: noise is not made a picture."""
@@ -71,19 +65,9 @@ class TrueStar:
     y_px: float
 
 
-def save_picture(picture: NDArray[np.uint8], path: Path) -> None:
-    """Write grey values (rows, columns) unchanged as PNG; raises ValueError if it cannot."""
-    content, about = BytesIO(), PngInfo()
-    about.add_text("Software", SOFTWARE)
-    Image.fromarray(picture).save(content, "png", pnginfo=about)
-    write_output(path, content.getvalue())
-
-
-def is_saved_picture(path: Path) -> bool:
-    """Whether ``save_picture`` wrote a file."""
-    with suppress(UntrustedError, OSError):
-        return f"tEXtSoftware\0{SOFTWARE}".encode() in read_bytes(path)
-    return False
+def save_picture(picture: NDArray[np.uint8], path: Path, command: str = "cubestack") -> None:
+    """Write grey values (rows, columns) unchanged, as ``save_png`` does."""
+    save_png(Image.fromarray(picture), path, command)
 
 
 def save_sample(picture: NDArray[np.uint8], path: Path | BinaryIO) -> None:
@@ -115,7 +99,7 @@ def annotate(
     truth: Sequence[TrueStar] = (),
 ) -> None:
     """Write ``star_sheet`` of the same arguments as a PNG."""
-    star_sheet(picture, stars, title, left_out, lens, truth).save(path)
+    save_png(star_sheet(picture, stars, title, left_out, lens, truth), path, DEMO)
 
 
 def star_sheet(
@@ -202,7 +186,7 @@ def save_residuals(places: NDArray[np.float64], residuals: NDArray[np.float64], 
         draw.ellipse((x - 2, y - 2, x + 2, y + 2), fill=PLACE)
         draw.line((x, y, x + dx, y + dy), fill=ARROW)
     draw.text((MARGIN_PX, 12), f"measured less fitted, magnified {scale:g} times", fill=PLACE)
-    image.save(path)
+    save_png(image, path, CALIBRATE)
 
 
 def _round(value: float) -> float:

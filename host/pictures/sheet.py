@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
+from cubestack.host.pictures.files import DEMO, save_png
 from cubestack.host.pictures.labels import Box, Wanted, place
 
 Colour = tuple[int, int, int]
@@ -126,7 +127,7 @@ class Sheet:
 
     def save(self, path: Path, title: str, told: str, legend: Sequence[Entry]) -> None:
         """Write it as a PNG with labels, with ``title``, the text ``told``, and a legend below."""
-        self.finished(title, told, legend).save(path)
+        save_png(self.finished(title, told, legend), path, DEMO)
 
     def finished(self, title: str, told: str, legend: Sequence[Entry]) -> Image.Image:
         """The whole, as ``save`` writes it."""

@@ -44,6 +44,8 @@ class PortCommands:
         path = Path(words[0])
         if path.suffix.lower() != ".png":
             raise ShellError(f"image: {path} must end in .png")
+        if path.exists():
+            raise ShellError(f"image: {path} exists; choose another name")
         picture = self._download(words[1] if len(words) > 1 else None)
         save_picture(picture, path)
         rows, columns = picture.shape

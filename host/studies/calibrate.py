@@ -33,6 +33,7 @@ from cubestack.host.clients.contract import DeviceClient, FoundStar
 from cubestack.host.devices.experiment import Experiment, Result
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.options import Options, output_option, path_option
+from cubestack.host.pictures.files import CALIBRATE, is_from
 from cubestack.host.pictures.images import save_residuals
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff")
@@ -70,6 +71,14 @@ class CalibrateOptions(Options):
             raise ValueError("--scene requires --emulated: it sets the unit's lens")
         if self.out is not None and (self.out.suffix != ".json" or not self.out.parent.is_dir()):
             raise ValueError(f"--out must be a file NAME.json in a folder that is, not {self.out}")
+        drawn = self.residuals
+        if drawn is not None and drawn.exists() and not is_from(CALIBRATE, drawn):
+            raise ValueError(f"{drawn} exists, and shows no residuals; choose another --out")
+
+    @property
+    def residuals(self) -> Path | None:
+        """The picture of residuals; one of an earlier calibration is replaced."""
+        return self.out and self.out.with_suffix(".png")
 
     @property
     def pictures(self) -> list[Path]:
@@ -166,9 +175,9 @@ class StarCalibration(
             fit = fit_camera(sights, camera, self.free)
             camera = fit.camera
         before = fit_camera(sights, guess, ()).after_px
-        if options.out is not None:
+        if options.out is not None and options.residuals is not None:
             save_camera(camera, options.out)
-            save_residuals(fit.places, fit.residuals, options.out.with_suffix(".png"))
+            save_residuals(fit.places, fit.residuals, options.residuals)
         lens_px = None
         if options.images is None:
             lens_px = self._over_picture(self.condition(options).optics, camera, ()).after_px

@@ -21,6 +21,7 @@ from rich.table import Table
 from cubestack.host.cli.arguments import add_flag
 from cubestack.host.devices.device import AnyDevice
 from cubestack.host.devices.registry import devices
+from cubestack.host.output import write_output
 from cubestack.host.terminal import busy, show, tell
 
 
@@ -77,7 +78,7 @@ def run(args: argparse.Namespace) -> int:
             if not args.json:
                 tell(f"{one.build}, {one.timing}: {sum(one.phases.values()):,} cycles")
     if args.write:
-        report.file.write_text(json.dumps(report.as_data(found), indent=1) + "\n", "utf-8")
+        write_output(report.file, json.dumps(report.as_data(found), indent=1) + "\n")
         _rewrite(Path("docs") / report.document, report.page(found))
     elif args.json:
         print(json.dumps(report.as_data(found)))
@@ -116,4 +117,4 @@ def _rewrite(page: Path, table: str) -> None:
     if _BEGIN not in text or _END not in text:
         raise ValueError(f"{page} has no {_BEGIN.strip()}")
     before, rest = text.split(_BEGIN)
-    page.write_text(f"{before}{_BEGIN}\n{table}\n\n{_END}{rest.split(_END)[1]}", "utf-8")
+    write_output(page, f"{before}{_BEGIN}\n{table}\n\n{_END}{rest.split(_END)[1]}")

@@ -25,6 +25,8 @@ from cubestack.host.devices.device import PROFILE_OPTIONS, BoardT_co, ClientT_co
 from cubestack.host.devices.registry import devices
 from cubestack.host.emulation.process import emulating
 from cubestack.host.errors import PortClosedError, PortOpenError
+from cubestack.host.output import output_folder, write_output
+from cubestack.host.pictures.files import DEMO, is_from
 from cubestack.host.terminal import busy, head, say, tell
 from cubestack.host.transport.streams import open_transport
 
@@ -46,7 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Show the devices; returns 1 if one of them did not find its target."""
-    args.out.mkdir(parents=True, exist_ok=True)
+    output_folder(args.out)
     board = [f"--{name}={value}" for name, value in given_options(args).items()]
     found = [
         one.study("demo")(one, args.out, args.seed, args.photographs, board)
@@ -66,11 +68,15 @@ class Demo:
     Attributes:
         out: folder of everything that is written.
         name: stem of the scene file.
+        pictures: names of the pictures.
     """
 
-    def __init__(self, out: Path, name: str, title: str) -> None:
+    def __init__(self, out: Path, name: str, title: str, *pictures: str) -> None:
+        """Begin; raises ValueError for a file in the way that no earlier demonstration wrote."""
         self.out = out
         self.name = name
+        self.pictures = pictures
+        self._check()
         self._started = time.monotonic()
         head(title)
 
@@ -83,7 +89,7 @@ class Demo:
         ``board`` are arguments of `cubestack emulate`.
         """
         path = self.out / f"{self.name}.toml"
-        path.write_text(scene, encoding="utf-8")
+        write_output(path, scene)
         words = [device.name, "--scene", str(path), *board]
         with _served(words, self.out / f"tty{device.name.upper()}") as port:
             line = open_transport(str(port), device.interface.baud)
@@ -91,10 +97,16 @@ class Demo:
             yield device.client(node), port
             node.close()
 
-    def finish(self, *pictures: str, virtual_s: float | None = None) -> None:
+    def _check(self) -> None:
+        for name in self.pictures:
+            path = self.out / name
+            if path.exists() and not is_from(DEMO, path):
+                raise ValueError(f"{path} exists, and no demo wrote it; choose another --out")
+
+    def finish(self, virtual_s: float | None = None) -> None:
         wall = f"{time.monotonic() - self._started:.1f} s of wall time"
         times = wall if virtual_s is None else f"{virtual_s:.1f} s of virtual time in {wall}"
-        names = ", ".join(str(self.out / picture) for picture in pictures)
+        names = ", ".join(str(self.out / picture) for picture in self.pictures)
         tell(f"{times}; pictures: {names}")
 
 

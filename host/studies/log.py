@@ -43,8 +43,7 @@ def run(args: argparse.Namespace) -> int:
     """Log; returns 0 if every line has a result."""
     lines: list[Columns] = []
     with Outputs() as stack:
-        target = open_any_target(args.target, args)
-        stack.callback(target.close)
+        target = stack.enter_context(open_any_target(args.target, args, keep=False))
         if target.device is None:
             raise TargetError(f"{args.target}: no registered device")
         client, shell = target.device.client(target.node), Shell(target)
@@ -65,6 +64,7 @@ def run(args: argparse.Namespace) -> int:
                 interval_s=args.interval,
                 before_each=lambda: perform(args.each),
             ):
+                target.outputs.keep()
                 lines.append(line)
                 if writer is None and line["error"] is None:
                     writer = csv.DictWriter(stream, list(line))

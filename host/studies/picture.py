@@ -12,6 +12,7 @@ examples:
 
 import argparse
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from cubestack.emulator.camera.common.image_sensor import StarSensor
@@ -23,7 +24,8 @@ from cubestack.host.cli.arguments import add_flag, add_output, add_path, add_val
 from cubestack.host.clients.quaternions import pointing_deg
 from cubestack.host.devices.registry import device, device_names
 from cubestack.host.emulation.emulated import open_device
-from cubestack.host.pictures.images import SKY, is_saved_picture, save_picture, stretched
+from cubestack.host.pictures.files import PICTURE, is_from
+from cubestack.host.pictures.images import SKY, save_picture, stretched
 from cubestack.host.terminal import say
 
 ANGLES = {
@@ -42,7 +44,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_value(parser, "seed", whole(0, "of the noise (default 0)", 0))
     add_flag(parser, "--stretched", "lift faint stars for the eye; not for uploads")
     meaning = "image to write; replaces an earlier one of this command"
-    add_output(parser, "--out", meaning, "FILE.png", required=True, renews=is_saved_picture)
+    add_output(
+        parser, "--out", meaning, "FILE.png", required=True, renews=partial(is_from, PICTURE)
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -54,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
         assert isinstance(camera, StarSensor)
         picture, truth = camera.rendered, camera.scene.truth(emulated.board.kernel.now)
         assert picture is not None
-    save_picture(stretched(picture, SKY) if args.stretched else picture, args.out)
+    save_picture(stretched(picture, SKY) if args.stretched else picture, args.out, PICTURE)
     rows, columns = picture.shape
     say(f"{args.out}: {columns} x {rows} pixels")
     if truth is not None:

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from cubestack.host import output
-from cubestack.host.output import Outputs, write_output
+from cubestack.host.output import Outputs, write_new_folder, write_output, write_outputs
 
 BEFORE = "what was there\n"
 
@@ -150,3 +150,38 @@ def test_writes_into_pipes_and_devices(tmp_path: Path) -> None:
 def test_path_that_can_not_be_written_is_one_line(tmp_path: Path, name: str, reason: str) -> None:
     with pytest.raises(ValueError, match=f"^can not write .*: {reason}$"):
         write_output(tmp_path / name, "")
+
+
+def test_files_of_a_folder_are_written_all_or_none(path: Path) -> None:
+    with Outputs() as theirs:
+        theirs.create(path.with_name("two"))
+        with pytest.raises(ValueError, match="it is being written already"):
+            write_outputs(path.parent, {path.name: "new", "two": b"new"})
+        assert path.read_text() == BEFORE
+    write_outputs(path.parent, {path.name: "new", "two": b"new"})
+    assert (path.read_text(), path.with_name("two").read_text()) == ("new", "new")
+
+
+def test_new_folder_appears_whole(path: Path) -> None:
+    place = path.parent / "a" / "b"
+    write_new_folder(place, {"x": "1", "c/y": b"2"})
+    assert (place / "c" / "y").read_text() == "2"
+    with pytest.raises(ValueError, match="b exists; remove it"):
+        write_new_folder(place, {"x": "3"})
+    with pytest.raises(ValueError, match="can not write"):
+        write_new_folder(path.parent / "n", {"x": "1", "x/y": "2"})
+    assert sorted(os.listdir(path.parent)) == ["a", path.name]
+    assert os.listdir(path.parent / "a") == ["b"]
+
+
+def test_dropped_file_changes_nothing_and_a_kept_one_stays(path: Path) -> None:
+    with Outputs() as outputs:
+        outputs.create(path).write("new")
+        outputs.drop()
+    assert path.read_text() == BEFORE
+    with Outputs() as outputs:
+        outputs.create(path).write("new")
+        outputs.keep()
+        outputs.drop()
+    assert path.read_text() == "new"
+    assert alone(path)

@@ -1,8 +1,7 @@
 """Writes a capture and the emulated outputs as one VCD file that `cubestack hdl wave` shows."""
 
 from collections.abc import Iterator
-from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TextIO
 
 import numpy as np
 
@@ -21,7 +20,7 @@ class _Variable(NamedTuple):
     known: Levels
 
 
-def write_vcd(compared: ComparedCapture, path: Path) -> None:
+def write_vcd(compared: ComparedCapture, stream: TextIO) -> None:
     """Write PIN as captured, EMU_PIN as emulated (x: not compared), and DIFFERS; times in ps."""
     variables = list(_variables(compared))
     times = np.concatenate([variable.times for variable in variables])
@@ -37,20 +36,19 @@ def write_vcd(compared: ComparedCapture, path: Path) -> None:
         for v, code in zip(variables, codes, strict=True)
     ]
     head += ["$upscope $end", "$enddefinitions $end"]
-    with path.open("w", encoding="ascii") as stream:
-        stream.write("\n".join(head) + "\n")
-        now = -1
-        rows = (array[order].tolist() for array in (times - start, numbers, levels, known))
-        for time, number, level, bits in zip(*rows, strict=True):
-            if time != now:
-                stream.write(f"#{time}\n")
-                now = time
-            width, code = variables[number].width, codes[number]
-            if width == 1:
-                stream.write(f"{level & 1 if bits & 1 else 'x'}{code}\n")
-            else:
-                stream.write(f"b{_binary(level, bits, width)} {code}\n")
-        stream.write(f"#{max(now, compared.capture.end_ps - start)}\n")
+    stream.write("\n".join(head) + "\n")
+    now = -1
+    rows = (array[order].tolist() for array in (times - start, numbers, levels, known))
+    for time, number, level, bits in zip(*rows, strict=True):
+        if time != now:
+            stream.write(f"#{time}\n")
+            now = time
+        width, code = variables[number].width, codes[number]
+        if width == 1:
+            stream.write(f"{level & 1 if bits & 1 else 'x'}{code}\n")
+        else:
+            stream.write(f"b{_binary(level, bits, width)} {code}\n")
+    stream.write(f"#{max(now, compared.capture.end_ps - start)}\n")
 
 
 def _variables(compared: ComparedCapture) -> Iterator[_Variable]:

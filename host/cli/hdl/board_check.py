@@ -14,6 +14,7 @@ from cubestack.host.cli.device_options import add_board_arguments, chosen_option
 from cubestack.host.cli.hdl.design import fpga_wiring
 from cubestack.host.devices.registry import device as registered
 from cubestack.host.devices.registry import devices
+from cubestack.host.output import Outputs, output_folder
 from cubestack.host.terminal import busy, progress, say, show, tell
 
 if TYPE_CHECKING:
@@ -134,10 +135,14 @@ def _sums(counters: "list[Counters]") -> tuple[int, int, int, int]:
 def _write_vcd(found: "Found", folder: Path) -> None:
     from vcd import VCDWriter
 
-    folder.mkdir(parents=True, exist_ok=True)
     with (
-        (folder / VCD_FILE).open("w", encoding="ascii") as stream,
-        VCDWriter(stream, timescale="1 ps", version="cubestack", date="") as writer,
+        Outputs() as outputs,
+        VCDWriter(
+            outputs.create(output_folder(folder) / VCD_FILE),
+            timescale="1 ps",
+            version="cubestack",
+            date="",
+        ) as writer,
     ):
         pins = found.waves[0].compiled if found.waves else {}
         variables = {

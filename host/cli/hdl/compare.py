@@ -15,6 +15,7 @@ from cubestack.host.cli.device_options import add_board_arguments, chosen_option
 from cubestack.host.cli.hdl.design import fpga_wiring
 from cubestack.host.devices.registry import device as registered
 from cubestack.host.devices.registry import devices
+from cubestack.host.output import Outputs, output_folder
 from cubestack.host.terminal import busy, say, show, tell
 
 if TYPE_CHECKING:
@@ -100,8 +101,8 @@ def run(args: argparse.Namespace) -> int:
             powered_up=args.from_power_up,
         )
     if args.out is not None:
-        args.out.mkdir(parents=True, exist_ok=True)
-        write_vcd(compared, args.out / VCD_FILE)
+        with Outputs() as outputs:
+            write_vcd(compared, outputs.create(output_folder(args.out) / VCD_FILE))
     if args.json:
         print(json.dumps(_as_json(compared), indent=1))
     else:

@@ -9,10 +9,11 @@ from typing import Any
 from cubestack.firmware_model.values import whole
 from cubestack.hdl.contract.contract import QUICK, TIERS, Contract
 from cubestack.hdl.contract.points import Coverage
-from cubestack.hdl.contract.running import Report, Result, run_checks, write_junit
+from cubestack.hdl.contract.running import Report, Result, junit, run_checks
 from cubestack.host.cli.arguments import add_flag, add_output, add_value
 from cubestack.host.cli.hdl.design import FILE, add_design, design_of
 from cubestack.host.cli.hdl.wave import FOLDERS
+from cubestack.host.output import output_folder, write_output
 from cubestack.host.terminal import say, tell
 
 NAME = "test"
@@ -78,7 +79,8 @@ def run(args: argparse.Namespace) -> int:
         told=told,
     )
     if args.junit:
-        write_junit(args.junit, report, design.contract)
+        output_folder(args.junit.parent)
+        write_output(args.junit, junit(report, design.contract))
     if args.json:
         print(json.dumps(_as_json(report, design.contract), indent=1))
     else:

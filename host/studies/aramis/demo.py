@@ -15,6 +15,7 @@ from cubestack.host.clients.aramis.client import Aramis, Attitude
 from cubestack.host.devices.device import Device
 from cubestack.host.experiments.attitude import errors
 from cubestack.host.experiments.scene_truth import true_stars
+from cubestack.host.pictures.files import DEMO
 from cubestack.host.pictures.images import annotate, save_picture
 from cubestack.host.studies.demo import Demo, download, tell_times
 from cubestack.host.terminal import tell
@@ -33,7 +34,8 @@ def show(
     board: Sequence[str],
 ) -> bool:
     """Measure twice and download; returns whether both measurements were conclusive."""
-    demo = Demo(out, "aramis-sky", "star tracker without FPGA: Orion, 21.5 deg, 2026")
+    subject = "star tracker without FPGA: Orion, 21.5 deg, 2026"
+    demo = Demo(out, "aramis-sky", subject, "aramis-raw.png", "aramis-stars.png")
     ra, dec, roll = POINTING_DEG
     truth = quaternion_from_pointing(ra, dec, roll)
     scene = f'kind = "sky"\nra_deg = {ra}\ndec_deg = {dec}\nroll_deg = {roll}\nseed = {seed}\n'
@@ -52,12 +54,12 @@ def show(
         if isinstance(switches, AramisSwitches) and switches.belief == "unique":
             left_out.append("names of stars outside the unique triangle")
         picture = download("the picture over the serial line", aramis.image)
-    save_picture(picture, out / "aramis-raw.png")
+    save_picture(picture, out / "aramis-raw.png", DEMO)
     lens = CONDITION.optics.project
     told = true_stars(truth, lens, picture.shape, CONDITION.optics.field_stop_deg / 2)
     title = "AraMiS (star tracker), rendered sky: Orion, 2026"
     annotate(picture, stars, out / "aramis-stars.png", title, left_out, lens, told)
-    demo.finish("aramis-raw.png", "aramis-stars.png")
+    demo.finish()
     return lost.valid and aided.valid
 
 

@@ -11,6 +11,7 @@ import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from importlib.metadata import version
+from io import BytesIO
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from typing import Any
 from cubestack.firmware_model.formats.untrusted import parse_json, read_json, read_lines
 from cubestack.host.emulation.emulated import AnyEmulated
 from cubestack.host.export.parquet import arrow as pyarrow
+from cubestack.host.output import write_output
 from cubestack.host.studies.campaign.block import Row, frames_of, measured, perform, rows_of
 from cubestack.host.studies.campaign.plan import CampaignPlan, FrameBlock
 from cubestack.host.studies.workers import performed
@@ -168,7 +170,7 @@ def write_parquet(folder: Folder) -> Path:
     Columns are the attributes of ``Row``; a swept option is ``swept.NAME``, a value of the result
     ``result.NAME``.
 
-    Raises ValueError without rows, and without pyarrow.
+    Replaces an earlier one. Raises ValueError without rows, and without pyarrow.
     """
     arrow = pyarrow()
     table = arrow.Table.from_pylist([vars(row) for row in folder.rows()])
@@ -180,9 +182,10 @@ def write_parquet(folder: Folder) -> Path:
         table = table.remove_column(at)
         for name, column in zip((one.name for one in fields.type), fields.flatten(), strict=True):
             table = table.append_column(f"{nested}.{name}", column)
-    new = folder.path / f"{PARQUET_FILE}.new"
-    arrow.parquet.write_table(table, new)
-    return new.replace(folder.path / PARQUET_FILE)
+    whole = BytesIO()
+    arrow.parquet.write_table(table, whole)
+    write_output(folder.path / PARQUET_FILE, whole.getvalue())
+    return folder.path / PARQUET_FILE
 
 
 def run(folder: Folder, workers: int, scheduler: str | None = None) -> Iterator[Row]:

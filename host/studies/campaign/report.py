@@ -14,6 +14,7 @@ from cubestack.host.emulation.emulated import AnyEmulated
 from cubestack.host.experiments.measure import MEASURE, experiment_of
 from cubestack.host.experiments.rates import wilson
 from cubestack.host.experiments.scene_truth import picture_of
+from cubestack.host.output import write_outputs
 from cubestack.host.pictures.figures import error_curves, rate_curves
 from cubestack.host.pictures.images import save_sample
 from cubestack.host.studies.campaign.block import Row
@@ -128,11 +129,9 @@ def write(
     done = (row.result for row in folder.rows() if row.result)
     sections = list(measured.sections(done))
     pictures |= {f"{each.title.replace(' ', '-')}.png": each.png for each in sections if each.png}
-    for name, png in pictures.items():
-        (folder.path / name).write_bytes(png)
-    page = folder.path / PAGE
-    page.write_text(_page(folder, found, pictures, sections, changes, against, cases), "utf-8")
-    return [page, *(folder.path / name for name in pictures)]
+    page = _page(folder, found, pictures, sections, changes, against, cases)
+    write_outputs(folder.path, {PAGE: page, **pictures})
+    return [folder.path / name for name in (PAGE, *pictures)]
 
 
 def _swept(folder: Folder, name: str, found: Mapping[Point, Counter[str]]) -> bytes:

@@ -13,6 +13,7 @@ from cubestack.host.clients.cubesense.client import CubeSense, Measurement, dire
 from cubestack.host.clients.cubesense.download import ServicePortClient
 from cubestack.host.devices.device import Device
 from cubestack.host.experiments.cubesense.pictures import annotate_nadir, annotate_sun
+from cubestack.host.pictures.files import DEMO
 from cubestack.host.pictures.images import save_picture
 from cubestack.host.studies.demo import ANSWER_TIMEOUT_S, Demo, download, tell_times
 from cubestack.host.terminal import tell
@@ -34,7 +35,9 @@ def show(
     board: Sequence[str],
 ) -> bool:
     """Measure with both sensors; returns whether both found their target."""
-    demo = Demo(out, "earth-sun", "sun and nadir sensor: the Sun, and the Earth from 750 km")
+    subject = "sun and nadir sensor: the Sun, and the Earth from 750 km"
+    names = (f"{name}{end}.png" for name in ("sun", "nadir") for end in ("-raw", ""))
+    demo = Demo(out, "earth-sun", subject, *names)
     scene = (
         f'kind = "earth-sun"\nsun_deg = {list(SUN_DEG)}\nnadir_deg = {list(NADIR_DEG)}\n'
         f"seed = {seed}\n"
@@ -48,7 +51,7 @@ def show(
         ]
         uptime_s = cubesense.uptime_s()
         line.close()
-    demo.finish("sun.png", "nadir.png", virtual_s=uptime_s)
+    demo.finish(uptime_s)
     return all(found)
 
 
@@ -66,7 +69,7 @@ def _measure(
     picture = download(
         f"the {name} picture over the bench port", lambda shown: bench.download(camera, shown)
     )
-    save_picture(picture, out / f"{name}-raw.png")
+    save_picture(picture, out / f"{name}-raw.png", DEMO)
     _annotate(cubesense, measured, picture, truth, out / f"{name}.png")
     return measured.detected
 

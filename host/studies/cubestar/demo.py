@@ -24,6 +24,7 @@ from cubestack.host.clients.cubestar.operator import calibrate, find_threshold
 from cubestack.host.devices.device import Device
 from cubestack.host.experiments.attitude import errors
 from cubestack.host.experiments.scene_truth import true_stars
+from cubestack.host.pictures.files import DEMO
 from cubestack.host.pictures.images import annotate, save_picture
 from cubestack.host.pictures.sheet import Lens
 from cubestack.host.studies.demo import Demo, download, tell_times
@@ -114,7 +115,8 @@ def _show(
     device: Device[CubeStarBoard, CubeStar], subject: _Subject, out: Path, board: Sequence[str]
 ) -> bool:
     """Capture, solve and download one subject; returns whether it was solved."""
-    demo = Demo(out, subject.name, subject.title)
+    raw, marked = f"{subject.name}-raw.png", f"{subject.name}-stars.png"
+    demo = Demo(out, subject.name, subject.title, raw, marked)
     with demo.client(device, subject.scene, board) as (cubestar, _):
         if subject.camera is not None:
             fit = calibrate(load_camera(subject.camera).cropped(*CROP))
@@ -132,21 +134,20 @@ def _show(
         left_out = left_out_by(cubestar)
         picture = download("the picture over the serial line", cubestar.stream_image)
         uptime = cubestar.client.telemetry("Identification")
-    pictures = f"{subject.name}-raw.png", f"{subject.name}-stars.png"
-    save_picture(picture, out / pictures[0])
+    save_picture(picture, out / raw, DEMO)
     lens = subject.lens()
     truth = true_stars(subject.truth, lens, picture.shape)
     annotate(
         picture,
         stars,
-        out / pictures[1],
+        out / marked,
         f"CubeStar (star tracker), {subject.title}",
         left_out,
         lens,
         truth,
     )
     virtual_s = int(uptime["RuntimeSeconds"]) + int(uptime["RuntimeMilliseconds"]) / 1000
-    demo.finish(*pictures, virtual_s=virtual_s)
+    demo.finish(virtual_s)
     return attitude.valid
 
 

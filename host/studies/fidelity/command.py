@@ -23,6 +23,7 @@ from cubestack.firmware_model.interface.codec.switches import PROFILES
 from cubestack.firmware_model.values import whole
 from cubestack.host.cli.arguments import add_flag, add_value
 from cubestack.host.devices.registry import devices
+from cubestack.host.output import write_output
 from cubestack.host.studies.fidelity import table as fidelity
 from cubestack.host.studies.workers import cores
 from cubestack.host.terminal import busy, say, tell
@@ -119,7 +120,7 @@ def _page(folder: Path, name: str) -> Path:
 
 def _show(args: argparse.Namespace, rows: list[fidelity.Measured], page: Path | None) -> None:
     if page is not None:
-        page.write_text(fidelity.rewritten(page.read_text("utf-8"), rows), "utf-8")
+        write_output(page, fidelity.rewritten(page.read_text("utf-8"), rows))
         say(f"wrote {len(rows)} rows to {page}")
     elif args.json:
         for row in rows:

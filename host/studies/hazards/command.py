@@ -32,6 +32,7 @@ from cubestack.host.experiments.measure import experiment_of
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.experiments.rates import wilson
 from cubestack.host.experiments.scene_truth import cameras_of
+from cubestack.host.output import write_output
 from cubestack.host.pictures.figures import save_curves
 from cubestack.host.pictures.images import save_sample
 from cubestack.host.studies.hazards import curves
@@ -138,7 +139,7 @@ def write_page(points: Sequence[Point], folder: Path, seed: int) -> int:
     """Write images, curves, points and the page; returns the number of files."""
     pictures = folder / PICTURES
     lines = [json.dumps(point.as_dict()) for point in points]
-    (pictures / "points.jsonl").write_text("\n".join(lines) + "\n", "utf-8")
+    write_output(pictures / "points.jsonl", "\n".join(lines) + "\n")
     names = dict.fromkeys(point.hazard for point in points)
     for name in names:
         own = [point for point in points if point.hazard == name]
@@ -153,7 +154,7 @@ def write_page(points: Sequence[Point], folder: Path, seed: int) -> int:
             save_sample(sample(device, name, seed), pictures / f"{name}-{device}.jpg")
     before, after = _page(folder)
     sections = [_section(name, [p for p in points if p.hazard == name]) for name in sorted(names)]
-    (folder / PAGE).write_text(before + BEGIN + "\n".join(sections) + END + after, "utf-8")
+    write_output(folder / PAGE, before + BEGIN + "\n".join(sections) + END + after)
     return 2 + len(names) + len({(point.hazard, point.device) for point in points})
 
 

@@ -8,6 +8,7 @@ from html import escape
 from importlib.metadata import version
 from pathlib import Path
 
+from cubestack.host.output import output_folder, write_outputs
 from cubestack.host.studies.campaign.report import STYLE, html_table
 from cubestack.host.studies.powerfail.cases import KINDS
 from cubestack.host.studies.powerfail.course import Course
@@ -24,10 +25,9 @@ MOST_LISTED = 200
 
 def open_folder(path: Path, *, force: bool) -> Path:
     """Create a folder for a run; ValueError if it has one already and is not to be replaced."""
-    if (path / ROWS).exists() and not force:
+    if any((path / name).exists() for name in (ROWS, PAGE)) and not force:
         raise ValueError(f"{path} has results; choose another --out, or replace them with --force")
-    path.mkdir(parents=True, exist_ok=True)
-    return path
+    return output_folder(path)
 
 
 def order(rows: Iterable[Row]) -> list[Row]:
@@ -37,12 +37,9 @@ def order(rows: Iterable[Row]) -> list[Row]:
 
 def write(folder: Path, setup: Setup, course: Course, rows: Sequence[Row]) -> Path:
     """Write rows and page; returns the page."""
-    with (folder / ROWS).open("w", encoding="utf-8") as stream:
-        for row in rows:
-            stream.write(json.dumps(asdict(row)) + "\n")
-    page = folder / PAGE
-    page.write_text(_page(setup, course, rows), encoding="utf-8")
-    return page
+    lines = "".join(json.dumps(asdict(row)) + "\n" for row in rows)
+    write_outputs(folder, {ROWS: lines, PAGE: _page(setup, course, rows)})
+    return folder / PAGE
 
 
 def summary(rows: Sequence[Row]) -> tuple[list[str], list[list[str]]]:

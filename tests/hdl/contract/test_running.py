@@ -12,7 +12,7 @@ from cubestack.hdl.contract.cubesense import declared as cubesense
 from cubestack.hdl.contract.cubestar.declared import CONTRACT
 from cubestack.hdl.contract.design import Design
 from cubestack.hdl.contract.points import Coverage
-from cubestack.hdl.contract.running import plan, run_checks, selected, write_junit
+from cubestack.hdl.contract.running import junit, plan, run_checks, selected
 from cubestack.hdl.flow.tools import have_yosys
 from cubestack.hdl.flow.verilog import verilog_file
 from cubestack.hdl.user import GatewareError
@@ -106,8 +106,7 @@ def test_failure_has_its_requirement_and_a_waveform(
     assert "ACK is early: the pixel at column 0 of row 0 is not in the memory" in failed.error
     assert report.waveform is not None
     assert find([tmp_path], failed.name).name == report.waveform.name
-    write_junit(tmp_path / "junit.xml", report, CONTRACT)
-    case = next(ElementTree.parse(tmp_path / "junit.xml").iter("testcase"))
+    case = next(ElementTree.fromstring(junit(report, CONTRACT)).iter("testcase"))
     (failure,) = case.findall("failure")
     assert failure.text == CONTRACT.checks[failed.name].requirement
 

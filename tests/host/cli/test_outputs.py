@@ -1,21 +1,22 @@
 """Every option that names a file to write: nothing is replaced unasked, or by a failing start."""
 
-import argparse
 import ast
-import hashlib
 import socket
-from collections.abc import Iterator
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 from PIL import Image
 
 import cubestack.host
-from cubestack.host.cli.main import make_parser
+from cubestack.firmware_model.formats.recording import load_recording
 from cubestack.host.output import Outputs
 
 from ...conftest import Run
 from ...tiers import quick
+from .failing_starts import digests, existing, outputs
+from .wrong_inputs import all_arguments
 
 LEFT = {
     "hdl prove --out": "a folder of generated names",
@@ -96,23 +97,12 @@ FAILING = {
 """Beside --force, by command; each fails."""
 
 
-def parsers(
-    parser: argparse.ArgumentParser, words: str = ""
-) -> Iterator[tuple[str, argparse.Action]]:
-    """Each option of each command."""
-    for action in parser._actions:
-        if isinstance(action, argparse._SubParsersAction):
-            for name, one in action.choices.items():
-                yield from parsers(one, f"{words} {name}".strip())
-        elif action.option_strings:
-            yield words, action
-
-
-OPTIONS = dict.fromkeys(
-    (f"{words} {action.option_strings[0]}", getattr(action, "inside", None))
-    for words, action in parsers(make_parser())
-)
-OUTPUTS = [(*option.rsplit(" ", 1), inside) for option, inside in OPTIONS if inside is not None]
+OPTIONS = {
+    f"{' '.join(one.command)} {one.name}": getattr(one.action, "inside", None)
+    for one in all_arguments()
+    if one.action.option_strings
+}
+OUTPUTS = [(" ".join(one.command), one.name, inside) for one, inside in outputs()]
 
 
 @pytest.fixture
@@ -121,23 +111,20 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def existing(folder: Path, inside: str) -> tuple[Path, Path]:
-    """What the option names, and the file that is there."""
-    named = folder / ("kept" if inside else "kept.png")
-    place = named / inside if inside else named
-    place.parent.mkdir(exist_ok=True)
-    place.write_bytes(b"precious\n" * 1000)
-    return named, place
-
-
-def digest(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
-
-
 def test_every_option_that_writes_is_declared_as_one() -> None:
-    plain = {option for option, inside in OPTIONS if inside is None}
+    plain = {option for option, inside in OPTIONS.items() if inside is None}
     named = {one for one in plain if WRITING & {*one.rsplit(" ", 1)[1].strip("-").split("-")}}
     assert named == set(LEFT)
+
+
+def failing(count: int) -> str:
+    call = [sys.executable, "-m", "tests.host.cli.failing_starts", str(count)]
+    return subprocess.run(call, capture_output=True, text=True, timeout=1500).stdout
+
+
+@pytest.mark.slow
+def test_twenty_failing_starts_of_each_command_change_no_output() -> None:
+    assert failing(20) == ""
 
 
 @pytest.mark.parametrize(
@@ -149,12 +136,12 @@ def test_existing_file_is_not_replaced_without_force(
     run: Run, folder: Path, words: str, option: str, inside: str
 ) -> None:
     named, place = existing(folder, inside)
-    before = digest(place)
+    before = digests(folder)
     needed = [word.format(folder=folder) for word in NEEDED.get(words, ())]
     outcome = run(*words.split(), *needed, option, named)
     assert outcome.code == 2
     assert f"{option}: {place} exists; choose another, or replace it with --force" in outcome.line
-    assert digest(place) == before
+    assert digests(folder) == before
 
 
 @pytest.mark.parametrize(
@@ -171,7 +158,7 @@ def test_failing_start_changes_no_file(
             sub = folder / option.strip("-")
             sub.mkdir()
             kept[option] = existing(sub, inside)
-    before = {place: digest(place) for _, place in kept.values()}
+    before = digests(folder)
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         options = [word.format(folder=folder, port=port) for word in wrong]
@@ -183,9 +170,40 @@ def test_failing_start_changes_no_file(
             *options,
         )
     assert outcome.code != 0
-    assert {place: digest(place) for place in before} == before
-    for place in before:
-        assert [one.name for one in place.parent.iterdir()] == [place.name]
+    assert digests(folder) == before  # and no file more
+
+
+FIRST = ("-c", "read Identification")
+
+
+@pytest.mark.parametrize(
+    ("words", "commands"),
+    [
+        ("shell", ("-c", "reed Identification")),
+        ("shell", ("-c", "read None")),
+        ("log", ("-c", "reed Identification")),
+        ("log", ("--each", "write None")),
+        ("log", (*FIRST, "--each", "write None")),
+    ],
+)
+def test_recording_is_replaced_only_after_a_right_command(
+    run: Run, folder: Path, words: str, commands: tuple[str, ...]
+) -> None:
+    named, _ = existing(folder, "")
+    before = digests(folder)
+    call = (words, *NEEDED[words], "--record", named, "--force")
+    assert run(*call, *commands).code == 2
+    assert digests(folder) == before
+    more = ("--count", "1") if words == "log" else ()
+    assert run(*call, *FIRST, *more).code in (0, 1)
+    assert load_recording(named).events
+
+
+def test_recording_of_a_session_that_fails_later_is_kept(run: Run, folder: Path) -> None:
+    named, _ = existing(folder, "")
+    call = ("shell", *NEEDED["shell"], "--record", named, "--force", *FIRST)
+    assert run(*call, "-c", "reed None").code == 2
+    assert load_recording(named).events
 
 
 @pytest.mark.parametrize("words", ["emulate", "shell", "log", "conformance"])
@@ -209,22 +227,13 @@ def test_second_writer_and_early_interrupt_change_no_file(
 
 
 WRITERS = {
-    "cli/new_sensor.py": "a new folder",
-    "cli/export.py": "a new folder",
-    "cli/hdl/board_check.py": "a file in a folder that the check declares",
     "ground/emulators.py": "a temporary folder",
     "ground/traces.py": "a temporary folder",
     "ground/relays.py": "a temporary folder",
     "emulation/history.py": "a temporary folder",
     "recording/setups.py": "a temporary folder",
     "studies/copies.py": "a pipe",
-    "studies/demo.py": "the folder of a demonstration",
     "studies/campaign/folder.py": "a campaign's folder, which locks and renames itself",
-    "studies/campaign/report.py": "a campaign's folder",
-    "studies/powerfail/report.py": "a folder whose option is declared",
-    "studies/costs.py": "rewrites a page and its data",
-    "studies/hazards/command.py": "rewrites a page",
-    "studies/fidelity/command.py": "rewrites a page",
     "studies/cubestar/reference_catalogue.py": "sources of the reference firmware",
     "native/wheels.py": "wheels of a release",
 }

@@ -107,6 +107,11 @@ class Case(NamedTuple):
 
 def arguments() -> Iterator[Argument]:
     """All arguments that take a value, of all commands and their actions."""
+    return (one for one in all_arguments() if one.action.nargs != 0)
+
+
+def all_arguments() -> Iterator[Argument]:
+    """The same, and flags."""
     yield from _arguments((), make_parser())
 
 
@@ -115,7 +120,7 @@ def _arguments(command: tuple[str, ...], parser: argparse.ArgumentParser) -> Ite
         if isinstance(action, argparse._SubParsersAction):
             for name, inner in action.choices.items():
                 yield from _arguments((*command, name), inner)
-        elif action.nargs != 0:
+        else:
             yield Argument(command, parser, action)
 
 
@@ -168,13 +173,15 @@ PYTHON = re.compile(
 ESCAPED = 99
 
 
-def outcome(words: tuple[str, ...], folder: Path) -> tuple[int | None, str]:
+def outcome(
+    words: tuple[str, ...], folder: Path, accepted_s: float = ACCEPTED_S
+) -> tuple[int | None, str]:
     """Exit status of a call, None if it had to be interrupted, and its standard error."""
     errors = folder / "stderr"
     child = os.fork()
     if child == 0:
         os._exit(_call(words, folder, errors))
-    status = _wait(child, ACCEPTED_S)
+    status = _wait(child, accepted_s)
     interrupted = status is None
     if interrupted:
         os.kill(child, signal.SIGINT)

@@ -118,17 +118,19 @@ def test_shell_image_command_saves_the_memory(node, shell, tmp_path):
     shell.execute(f"image {tmp_path}/a.png")
     assert (np.asarray(Image.open(tmp_path / "a.png")).ravel() == node.memory).all()
     with pytest.raises(TargetError, match="sends no picture 'x'"):
-        shell.execute(f"image {tmp_path}/a.png x")
+        shell.execute(f"image {tmp_path}/b.png x")
 
 
 def test_shell_image_command_saves_a_named_memory(sense, sense_shell, tmp_path):
     sense_shell.target.device = device("cubesense")
     sense.pictures[1, 7, 9] = 77
     with pytest.raises(TargetError, match="no memory 'sram3'; known: sram1, sram2"):
-        sense_shell.execute(f"image {tmp_path}/a.png sram3")
-    rows = sense_shell.execute(f"image {tmp_path}/a.png SRAM2").rows
-    assert rows == [("", f"{tmp_path}/a.png: 640 x 480")]
-    assert np.asarray(Image.open(tmp_path / "a.png"))[7, 9] == 77
+        sense_shell.execute(f"image {tmp_path}/c.png sram3")
+    rows = sense_shell.execute(f"image {tmp_path}/c.png SRAM2").rows
+    assert rows == [("", f"{tmp_path}/c.png: 640 x 480")]
+    assert np.asarray(Image.open(tmp_path / "c.png"))[7, 9] == 77
+    with pytest.raises(ShellError, match="exists; choose another name"):
+        sense_shell.execute(f"image {tmp_path}/c.png SRAM1")
 
 
 @pytest.mark.parametrize("command", ["scene x.toml", "fault", "power", "time"])

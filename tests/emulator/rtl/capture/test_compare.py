@@ -194,7 +194,8 @@ def test_vcd_of_both_ends_with_the_levels_of_both(recorded: Waves, tmp_path: Pat
     levels = {**recorded.levels, "ACK": recorded.levels["ACK"] * 0}
     planted = Waves(recorded.wiring, recorded.times, levels, recorded.widths)
     found = compared(write_vcd(tmp_path / "planted.vcd", planted))
-    write_both(found, tmp_path / "both.vcd")
+    with (tmp_path / "both.vcd").open("w") as stream:
+        write_both(found, stream)
     trace = read_wave(tmp_path / "both.vcd", 10_000)
     changes = [(time, changes) for time, changes in trace.moments if "DIFFERS" in changes]
     (difference,) = found.comparison.differences

@@ -85,5 +85,5 @@ def test_command_writes_the_folder(run: Run, tmp_path: Path) -> None:
         *("lib/cubesense_protocol.py", "screens/cubesense.txt"),
     }
     again = run(*command, "--out", folder)
-    assert again.line.endswith(f"--out {folder} exists; remove it, or choose another folder")
+    assert again.line.endswith(f"{folder} exists; remove it, or choose another folder with --out")
     assert (folder / "plugin.txt").exists()

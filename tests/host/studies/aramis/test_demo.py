@@ -147,3 +147,13 @@ def test_catalogue_command_prints_text(run: Run) -> None:
 def test_names_an_output_that_cannot_be_written(tmp_path: Path, run: Run) -> None:
     outcome = run("catalogue", "aramis", *SMALL, "--output", tmp_path / "no" / "x")
     assert (outcome.code, str(tmp_path / "no" / "x") in outcome.line) == (2, True)
+
+
+def test_demo_replaces_only_pictures_of_a_demo(show: Any, tmp_path: Path) -> None:
+    assert show(Tracker(FOUND, FOUND)) is True
+    assert show(Tracker(FOUND, FOUND)) is True
+    theirs = tmp_path / "aramis-stars.png"
+    theirs.write_bytes(b"precious")
+    with pytest.raises(ValueError, match=r"stars\.png exists, and no demo wrote it"):
+        show(Tracker(FOUND, FOUND))
+    assert theirs.read_bytes() == b"precious"
