@@ -14,6 +14,7 @@ emulated:DEVICE             a device emulated in this process; time passes while
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -24,8 +25,9 @@ from cubestack.firmware_model.formats.recording import load_recording
 from cubestack.firmware_model.interface.codec.field import InterfaceError
 from cubestack.firmware_model.interface.codec.message import Interface
 from cubestack.firmware_model.interface.codec.node_messages import IDENTIFICATION
+from cubestack.firmware_model.versions import interface_of
 from cubestack.host.clients.contract import Client
-from cubestack.host.clients.diagnosis import node_type_of, node_type_on
+from cubestack.host.clients.diagnosis import identity_on, node_type_of
 from cubestack.host.clients.i2c import I2cBus, I2cClient
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.clients.registers import RegisterClient, RegisterLine
@@ -224,7 +226,7 @@ def _open_real(
         baud = baud or (registers and registers.baud) or found.interface.baud
         line = open_transport(text, baud)
         if registers is None:
-            _check_type(text, found, lambda: node_type_on(line), line.close)
+            _check_identity(text, found, lambda: identity_on(line), line.close)
         taped = line if tape is None else tape.line(line, "uart", baud)
         node = NodeClient(taped, found.interface)
         target = Target(text, found.interface, node, taped, device=found, on_close=[taped.close])
@@ -238,13 +240,19 @@ def _open_real(
     return target
 
 
-def _check_type(
-    text: str, wanted: AnyDevice, node_type: Callable[[], int | None], close: Callable[[], None]
+def _check_identity(
+    text: str,
+    wanted: AnyDevice,
+    identity: Callable[[], tuple[int, int] | None],
+    close: Callable[[], None],
 ) -> None:
-    """Raise TargetError, and close the port, if the node is another registered device."""
+    """Raise TargetError, and close the port, if the node is another registered device.
+
+    Warns of firmware with another version of the interface: an operator may have no other tool.
+    """
     with ExitStack() as stack:
         stack.callback(close)
-        found = node_type()
+        found, version = identity() or (None, None)
         known = {node_type_of(one.interface): one for one in devices()}
         if found is not None and found != node_type_of(wanted.interface) and found in known:
             other = known[found]
@@ -253,18 +261,24 @@ def _check_type(
                 f"choose device {other.name}"
             )
         stack.pop_all()
+    if found == node_type_of(wanted.interface):
+        try:
+            interface_of(wanted.title, wanted.interface.version).check(version)
+        except ValueError as error:
+            warnings.warn(f"{text}: {error}; values may be wrong", stacklevel=3)
 
 
 def _a(title: str) -> str:
     return f"{'an' if title[0] in 'AEIOU' else 'a'} {title}"
 
 
-def _node_type_at(bus: I2cBus, interface: Interface, address: int | None) -> int | None:
+def _identity_at(bus: I2cBus, interface: Interface, address: int | None) -> tuple[int, int] | None:
     try:
         values = I2cClient(bus, interface, address, retries=0).telemetry(IDENTIFICATION.name)
     except (NodeError, InterfaceError):  # nobody there, or a device without this frame
         return None
-    return int(values[IDENTIFICATION.fields[0].name])
+    kind, version = (int(values[field.name]) for field in IDENTIFICATION.fields[:2])
+    return kind, version
 
 
 def _open_service_port(target: Target, text: str, tape: HostRecorder | None) -> int:
@@ -325,7 +339,7 @@ def _open_i2c(text: str, name: str | None, tape: HostRecorder | None) -> Target:
     opened = _open_bus(number)
     bus: I2cBus = opened if tape is None else tape.bus(opened)
     own = None if address in _addresses(interface)[1:] else address
-    _check_type(text, owner, lambda: _node_type_at(opened, interface, own), opened.close)
+    _check_identity(text, owner, lambda: _identity_at(opened, interface, own), opened.close)
     node, registers = I2cClient(bus, interface, own), _registers(interface, bus, time.sleep)
     on_close = [opened.close]
     return Target(text, interface, node, registers=registers, device=owner, on_close=on_close)

@@ -16,7 +16,7 @@ ROOT = Path(__file__).parent.parent
 PACKAGES = ("hdl", "firmware_model", "emulator", "host")
 
 #: Tables and formats that every package may import, ``hdl`` and ``host`` too.
-TABLES = ("firmware_model.values", "firmware_model.interface", "firmware_model.formats")
+TABLES = tuple(f"firmware_model.{one}" for one in ("values", "versions", "interface", "formats"))
 
 #: What each package may import of the others.
 BELOW = {"hdl": TABLES, "firmware_model": (), "emulator": ("hdl", "firmware_model"), "host": TABLES}
@@ -39,7 +39,7 @@ ORDER = {
     ),
     "hdl": ("blocks", "flow", "cubestar cubesense devboard", "proofs", "user", "contract"),
     "firmware_model": (
-        "values",
+        "values versions",
         "interface",
         "formats mcu",
         "attitude node",
@@ -70,6 +70,7 @@ THIRD_PARTY = {
     "hdl/proofs": {"amaranth", "vcd"},
     "firmware_model": {"numpy"},
     "firmware_model/values.py": set(),
+    "firmware_model/versions.py": set(),
     "firmware_model/interface": set(),
     "firmware_model/formats": set(),
 }

@@ -2,6 +2,7 @@
 
 ::
 
+    version = 1            # of the format; default: 1
     seed = 7
 
     [[fault]]
@@ -23,6 +24,7 @@ from cubestack.emulator.faults.declaration import TIMES, Fault, FaultError
 from cubestack.emulator.faults.table import make_fault
 from cubestack.firmware_model.formats.untrusted import parse_toml, read_text
 from cubestack.firmware_model.values import REQUIRED, read_table, text, whole
+from cubestack.firmware_model.versions import FAULT_PLAN
 
 _SEED = whole(0, "seed of the random numbers", 0)
 _OWN = {"kind": text(REQUIRED, "kind of fault"), "target": text(None, "target"), **TIMES}
@@ -59,6 +61,10 @@ def parse_plan(text: str, name: str = "plan") -> Plan:
     """Read the ``text`` of a plan; FaultError as for ``load_plan``."""
     table = parse_toml(text, name, FaultError)
     seed, entries = table.pop("seed", 0), table.pop("fault", [])
+    try:
+        FAULT_PLAN.check(table.pop("version", None))
+    except ValueError as error:
+        raise FaultError(f"{name}: {error}") from None
     if table:
         raise FaultError(
             f"{name}: unknown key {next(iter(table))!r}; a plan has seed and [[fault]]"

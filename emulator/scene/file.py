@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 
 from cubestack.firmware_model.formats.untrusted import read_toml
 from cubestack.firmware_model.values import read_table, text
+from cubestack.firmware_model.versions import SCENE
 
 V = TypeVar("V")
 
@@ -17,6 +18,9 @@ V = TypeVar("V")
 class SceneError(ValueError):
     """An impossible scene: a wrong value, key, file or picture. The text is one line."""
 
+
+VERSION_KEY = "version"
+"""Key of a scene file for the version of the format; without it, 1."""
 
 DEVICE_KEYS = ("profile", "set")
 """Keys of a scene file for the device: the switches that it runs with."""
@@ -43,10 +47,12 @@ def read_scene_file(
 ) -> V:
     """Read a scene file with the reader of its ``kind``; ``right`` names the accepted kinds.
 
-    The reader gets the file's other keys, without ``DEVICE_KEYS``. Raises as ``read_file``.
+    The reader gets the file's other keys, without ``DEVICE_KEYS`` and ``VERSION_KEY``. Raises as
+    ``read_file``.
     """
 
     def scene(table: dict[str, Any]) -> V:
+        SCENE.check(table.pop(VERSION_KEY, None))
         kind = table.pop("kind", None)
         table = {key: value for key, value in table.items() if key not in DEVICE_KEYS}
         if not isinstance(kind, str) or kind not in kinds:

@@ -23,8 +23,9 @@ from cubestack.firmware_model.formats.linux_i2c import (
     RdwrMessage,
     SmbusCall,
 )
+from cubestack.firmware_model.versions import I2C_SOCKET
 
-VERSION = 1
+VERSION = I2C_SOCKET.current
 """Of the protocol. HELLO, its refusal and the framing are the same in every version."""
 
 

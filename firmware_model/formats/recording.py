@@ -25,11 +25,7 @@ from typing import Any, Literal, Protocol
 
 from cubestack.firmware_model.formats import untrusted
 from cubestack.firmware_model.formats.setup import Setup, files_json, files_of
-from cubestack.firmware_model.formats.versions import check_version
-
-VERSION = 2
-READABLE = (1, 2)
-"""Versions that ``load_recording`` reads."""
+from cubestack.firmware_model.versions import RECORDING
 
 LARGEST = 4 << 30
 """Bytes of a recording."""
@@ -161,7 +157,11 @@ class RecordingWriter:
         """Write the header to ``stream``, which the caller closes."""
         self._stream = stream
         self._events = 0
-        header: dict[str, object] = {"recording": VERSION, "device": device, "lines": bauds}
+        header: dict[str, object] = {
+            "recording": RECORDING.current,
+            "device": device,
+            "lines": bauds,
+        }
         self._line(header | ({} if setup is None else {"setup": setup.to_json()}))
 
     def write(self, event: Event) -> None:
@@ -242,7 +242,7 @@ def _check_end(count: object, found: int) -> None:
 def _header(path: Path, content: dict[str, Any]) -> Recording:
     if "recording" not in content:
         raise ValueError("there is no header")
-    found = check_version("recording", content["recording"], READABLE)
+    found = RECORDING.check(content["recording"])
     lines = content["lines"]
     if not isinstance(content["device"], str) or not isinstance(lines, dict):
         raise ValueError('"device" must be a text and "lines" an object')

@@ -11,7 +11,7 @@ from amaranth.hdl import Fragment
 from amaranth.lib.wiring import Component, Out
 
 from cubestack.firmware_model.interface.pins import Pin
-from cubestack.hdl.user.source import ClassName, GatewareError
+from cubestack.hdl.user.source import VERSION, ClassName, GatewareError, check_version
 
 
 def make_component(
@@ -23,6 +23,7 @@ def make_component(
     """The component, whose ports are those of ``pins`` and further outputs; GatewareError."""
     name = f"{wanted.module}:{wanted.name}"
     kind = _load(wanted, name, str((folder or Path()).resolve()))
+    check_version(name, getattr(kind, VERSION, None))
     known = [
         parameter.name
         for parameter in inspect.signature(kind).parameters.values()

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from cubestack.firmware_model.formats.untrusted import read_text
+from cubestack.firmware_model.versions import GATEWARE
 
 #: Suffixes of files with Verilog and with SystemVerilog.
 VERILOG, SYSTEM_VERILOG = (".v",), (".sv",)
@@ -19,8 +20,20 @@ _TOP = re.compile(r"(.+?):([A-Za-z_$][\w$]*)")
 _COMMENT = re.compile(r"(?://|#).*")
 
 
+VERSION = "cubestack_version"
+"""Attribute of a top module or class: the version of the board's pins that it is written for."""
+
+
 class GatewareError(ValueError):
     """A user's design can not be used; one line for each reason."""
+
+
+def check_version(name: str, found: object) -> None:
+    """Raise GatewareError for a design ``name`` of another version; None is the first."""
+    try:
+        GATEWARE.check(found)
+    except ValueError as error:
+        raise GatewareError(f"{name}: {error}") from None
 
 
 @dataclass(frozen=True)

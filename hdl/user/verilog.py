@@ -14,7 +14,7 @@ from cubestack.hdl.user.netlist import LATCHES, Netlist
 from cubestack.hdl.user.nets import name_nets
 from cubestack.hdl.user.ports import fit_pins
 from cubestack.hdl.user.rtlil import write_rtlil
-from cubestack.hdl.user.source import SYSTEM_VERILOG, GatewareError, Source
+from cubestack.hdl.user.source import SYSTEM_VERILOG, VERSION, GatewareError, Source, check_version
 
 Parameters = Mapping[str, int | str]
 
@@ -182,6 +182,7 @@ class _Reader:
     def _only_module(self, modules: dict[str, Any]) -> dict[str, Any]:
         tops = [m for m in modules.values() if "top" in m["attributes"]]
         (top,) = tops
+        check_version(self._source.name, _attribute(top["attributes"].get(VERSION)))
         for name, cell in top["cells"].items():
             kind = cell["type"]
             if not kind.startswith("$") or kind.startswith("$paramod"):
@@ -202,6 +203,11 @@ class _Reader:
 
 def _is_system_verilog(name: str) -> bool:
     return Path(name).suffix.lower() in SYSTEM_VERILOG
+
+
+def _attribute(value: str | None) -> object:
+    """What Yosys writes of an attribute: binary digits of a whole number, else text."""
+    return int(value, 2) if value and not value.strip("01") else value
 
 
 def _constant(value: int | str) -> str:

@@ -38,8 +38,8 @@ def node_type_of(interface: Interface) -> int:
         return 0
 
 
-def node_type_on(line: Transport) -> int | None:
-    """Node type of the node on a line, by its identification; None if there is no such answer.
+def identity_on(line: Transport) -> tuple[int, int] | None:
+    """Type and interface version of the node on a line; None if it does not identify itself.
 
     The request has no side effects. Raises TransportError.
     """
@@ -53,7 +53,7 @@ def node_type_on(line: Transport) -> int | None:
         for byte in data:
             if decoder.feed(byte) is FrameEvent.FRAME:
                 whole = len(decoder.payload) == IDENTIFICATION.length
-                return decoder.payload[0] if whole else None
+                return (decoder.payload[0], decoder.payload[1]) if whole else None
     return None
 
 

@@ -18,6 +18,7 @@ from cubestack.firmware_model.interface.devboard.address import FORM as BOARD_FO
 from cubestack.firmware_model.interface.devboard.address import PREFIX as BOARD_PREFIX
 from cubestack.firmware_model.interface.devboard.address import parse_address
 from cubestack.firmware_model.values import TEXT, Declaration, ValueKind
+from cubestack.firmware_model.versions import SENSOR
 from cubestack.host.clients.contract import Client, DeviceClient
 from cubestack.host.options import SWITCH, option_string
 
@@ -61,7 +62,7 @@ BoardT_co = TypeVar("BoardT_co", bound="Board", covariant=True)
 ClientT_co = TypeVar("ClientT_co", bound=DeviceClient, covariant=True)
 
 
-VERSION = 1
+VERSION = SENSOR.current
 """Of what `cubestack.sensor` offers to sensors of other distributions."""
 
 FILE = "FILE"
@@ -271,11 +272,10 @@ class Device(Generic[BoardT_co, ClientT_co]):
         check_name(self.name)
         if self.interface.name.lower() != self.name:
             raise ValueError(f"the interface of {self.name} is called {self.interface.name}")
-        if self.written_for > VERSION:
-            raise ValueError(
-                f"{self.name} is written for version {self.written_for} of cubestack.sensor; "
-                f"this cubestack has version {VERSION}: install a newer cubestack"
-            )
+        try:
+            SENSOR.check(self.written_for)
+        except ValueError as error:
+            raise ValueError(f"{self.name}: {error}") from None
 
     @property
     def switches(self) -> type[Switches]:

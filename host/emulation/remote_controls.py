@@ -10,6 +10,7 @@ from urllib.parse import urlsplit
 
 from cubestack.firmware_model.formats.setup import files_json
 from cubestack.firmware_model.formats.untrusted import LARGEST_FILE, parse_json
+from cubestack.firmware_model.versions import CONTROL
 from cubestack.host.emulation.controls import spoken
 from cubestack.host.errors import PortOpenError, TargetError, TransportError
 from cubestack.host.recording.setups import read_document
@@ -149,10 +150,16 @@ class RemoteControls:
 def controlled(url: str, device: str | None = None) -> RemoteControls:
     """The controls of a device behind a control port; the token comes from the environment.
 
-    Raises TargetError without ``device`` if there are several.
+    Raises TargetError for another version of the protocol, and without ``device`` if there are
+    several.
     """
     client = ControlClient(url, os.environ.get(TOKEN, ""))
-    known = client.ask("GET", "/")["devices"]
+    about = client.ask("GET", "/")
+    try:
+        CONTROL.check(about.get("version"))
+    except ValueError as error:
+        raise TargetError(f"{url}: {error}") from None
+    known = about["devices"]
     if device is None and len(known) != 1:
         raise TargetError(f"{url} has {', '.join(known)}: give --device")
     return RemoteControls(client, device or known[0])

@@ -24,6 +24,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from cubestack.firmware_model.formats.setup import files_of
 from cubestack.firmware_model.formats.untrusted import parse_json
+from cubestack.firmware_model.versions import CONTROL
 from cubestack.host.ground import scenes
 from cubestack.host.ground.emulation import Emulation, JsonObject
 from cubestack.host.ground.guard import refusal, refused
@@ -202,7 +203,8 @@ def control_app(emulation: Emulation) -> Starlette:
     ]
 
     async def about(_request: Request) -> Response:
-        content = {"cubestack": version("cubestack"), "calls": [call.about() for call in CALLS]}
+        content: JsonObject = {"cubestack": version("cubestack"), "version": CONTROL.current}
+        content |= {"calls": [call.about() for call in CALLS]}
         content["devices"] = [one.device.name for one in emulation.emulated]
         return JSONResponse(content)
 

@@ -173,7 +173,7 @@ def test_new_sensor_folder_is_named_after_the_sensor(
     outcome = run("new-sensor", "glow")
     assert (outcome.code, outcome.line) == (
         2,
-        "cubestack new-sensor: glow-sensor exists; remove it, or choose another with --out",
+        "cubestack new-sensor: glow-sensor exists; remove it, or choose another folder with --out",
     )
 
 
@@ -225,7 +225,7 @@ MISTAKES: dict[str, tuple[Edit, str]] = {
     ),
     "newer_version": (
         (TABLES, "written_for=1", "written_for=9"),
-        r"glow is written for version 9 of cubestack.sensor; this cubestack has version 1: .*",
+        r"glow: the interface cubestack.sensor has version 9, this program reads 1; .*",
     ),
     "unknown_cost": (
         (SENSOR, "f32_div=1", "f32_dvi=1"),

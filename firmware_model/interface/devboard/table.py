@@ -9,8 +9,10 @@ from dataclasses import dataclass, fields
 from enum import IntEnum
 from typing import ClassVar, NamedTuple, Self
 
+from cubestack.firmware_model.versions import DEVELOPMENT_BOARD
+
 #: Of the protocol; a board with another one is rejected.
-VERSION = 1
+VERSION = DEVELOPMENT_BOARD.current
 
 #: Default rate of the serial line in baud; 8 data bits, no parity, 1 stop bit.
 BAUD = 3_000_000
@@ -256,10 +258,9 @@ class Identity:
         if len(data) < cls.SIZE:
             raise ProtocolError(f"an identity has {cls.SIZE} bytes, not {len(data)}")
         *numbers, design, name = cls._FORMAT.unpack_from(data)
-        if numbers[0] != VERSION:
-            raise ProtocolError(
-                f"the board has version {numbers[0]} of the protocol, not {VERSION}; "
-                "write a new bitstream"
-            )
+        try:
+            DEVELOPMENT_BOARD.check(numbers[0])
+        except ValueError as error:
+            raise ProtocolError(str(error)) from None
         named = dict(zip((field.name for field in fields(cls)), numbers, strict=False))
         return cls(**named, design=design, name=name.rstrip(b"\0").decode("ascii", "replace"))

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from cubestack.firmware_model.formats.untrusted import parse_json, read_json, read_lines
+from cubestack.firmware_model.versions import CAMPAIGN
 from cubestack.host.emulation.emulated import AnyEmulated
 from cubestack.host.export.parquet import arrow as pyarrow
 from cubestack.host.output import write_output
@@ -57,10 +58,11 @@ class Folder:
         self.path = path
         try:
             told = read_json(path / PLAN)
+            CAMPAIGN.check(told.get("format"))
             self.plan, self.version = CampaignPlan(**told["plan"]), str(told["version"])
         except FileNotFoundError:
             raise FolderError(f"{path} is no campaign's folder: it has no {PLAN}") from None
-        except (OSError, KeyError, TypeError, ValueError) as error:
+        except (OSError, AttributeError, KeyError, TypeError, ValueError) as error:
             raise FolderError(f"{path / PLAN}: {error}") from None
 
     @classmethod
@@ -76,7 +78,11 @@ class Folder:
         if not (path / PLAN).is_file():
             if any(path.iterdir()):
                 raise FolderError(f"{path} is not empty and has no campaign; choose another folder")
-            told = {"version": version("cubestack"), "plan": plan.as_dict()}
+            told = {
+                "format": CAMPAIGN.current,
+                "version": version("cubestack"),
+                "plan": plan.as_dict(),
+            }
             _replace(path / PLAN, [json.dumps(told, indent=1) + "\n"])
             return cls(path)
         found = cls(path)

@@ -1,9 +1,9 @@
 """A campaign's plan: a TOML file, and its blocks of frames.
 
-The file has ``device``, ``frames`` and ``seed``, and three tables of options of `cubestack measure
-DEVICE`, or of another ``command``: ``[options]`` for all frames, ``[grid]`` with lists of which
-every combination is a point, and ``[random]`` with what is drawn anew for each block
-(docs/how-to/campaigns.md has an example).
+The file has ``device``, ``frames``, ``seed`` and, if wanted, the ``version`` of the format, and
+three tables of options of `cubestack measure DEVICE`, or of another ``command``: ``[options]`` for
+all frames, ``[grid]`` with lists of which every combination is a point, and ``[random]`` with what
+is drawn anew for each block (docs/how-to/campaigns.md has an example).
 
 All points use the same skies and the same drawn values, so that they differ only by their options.
 """
@@ -20,6 +20,7 @@ import numpy as np
 
 from cubestack.firmware_model.formats.untrusted import read_text, read_toml
 from cubestack.firmware_model.values import REQUIRED, whole
+from cubestack.firmware_model.versions import CAMPAIGN_PLAN
 from cubestack.hdl.user.source import rebased
 from cubestack.host.devices.registry import device as registered
 from cubestack.host.devices.registry import devices
@@ -101,6 +102,7 @@ class CampaignPlan(Options):
         """
         try:
             table = read_toml(path)
+            CAMPAIGN_PLAN.check(table.pop("version", None))
             known = list(cls.__dataclass_fields__)
             for key in table:
                 if key not in known:

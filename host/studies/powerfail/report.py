@@ -8,6 +8,7 @@ from html import escape
 from importlib.metadata import version
 from pathlib import Path
 
+from cubestack.firmware_model.versions import POWERFAIL_ROWS
 from cubestack.host.output import output_folder, write_outputs
 from cubestack.host.studies.campaign.report import STYLE, html_table
 from cubestack.host.studies.powerfail.cases import KINDS
@@ -37,7 +38,8 @@ def order(rows: Iterable[Row]) -> list[Row]:
 
 def write(folder: Path, setup: Setup, course: Course, rows: Sequence[Row]) -> Path:
     """Write rows and page; returns the page."""
-    lines = "".join(json.dumps(asdict(row)) + "\n" for row in rows)
+    version = {"version": POWERFAIL_ROWS.current}
+    lines = "".join(json.dumps(version | asdict(row)) + "\n" for row in rows)
     write_outputs(folder, {ROWS: lines, PAGE: _page(setup, course, rows)})
     return folder / PAGE
 

@@ -22,6 +22,7 @@ from cubestack.firmware_model.values import (
     vector,
     whole,
 )
+from cubestack.firmware_model.versions import POWERFAIL_SCENARIO
 
 
 class ScenarioError(ValueError):
@@ -134,6 +135,7 @@ class Scenario(DeclaredValues):
         """
         try:
             given = read_toml(path)
+            POWERFAIL_SCENARIO.check(given.pop("version", None))
             return cls(**read_table(given, cls.declared()))
         except ValueError as error:
             raise ScenarioError(f"{path}: {error}") from None

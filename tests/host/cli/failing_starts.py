@@ -17,6 +17,9 @@ SEED = 1
 TRIES = 3
 """Wrong inputs per wanted refusal, at most: some are accepted."""
 
+FEWEST = 8
+"""Refusals of a command that has only one or two arguments."""
+
 REFUSED_S = 2.0
 """A call that is still running then was not wrong."""
 
@@ -49,7 +52,8 @@ def refusable(one: Argument) -> list[str]:
     """Kinds of wrong inputs that an argument most likely refuses."""
     if one.is_file:
         return ["missing", "folder", "binary", "json", "brackets", "loop", "nested", "line"]
-    if one.action.choices is not None or one.action.type is not None:
+    checked = one.action.choices is not None or one.action.type is not None
+    if checked or not one.action.option_strings:
         return list(TEXTS)
     return ["surrogate", "nested", "colon", "line"]
 
@@ -91,9 +95,10 @@ def try_all(count: int) -> int:
             name = f"{' '.join(output.command)} {output.name}"
             for one in changed:
                 print(f"{name}: changed by {one}", flush=True)
-            if refused < count:
+            few = refused < min(count, FEWEST)
+            if few:
                 print(f"{name}: only {refused} refusals", flush=True)
-            bad += len(changed) + (refused < count)
+            bad += len(changed) + few
             print(f"{name}: {refused}", file=sys.stderr, flush=True)
     return bad
 

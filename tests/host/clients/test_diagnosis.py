@@ -183,6 +183,18 @@ def test_device_with_an_unknown_node_type_is_accepted() -> None:
         open_target(port, "cubestar").close()
 
 
+def test_firmware_with_another_interface_is_used_with_a_warning() -> None:
+    interface = device("cubestar").interface
+    own = {"NodeType": diagnosis.node_type_of(interface)}
+    values = IDENTIFICATION.reset_values() | own | {"InterfaceVersion": interface.version + 1}
+    with answering(lambda _data: encode_frame(IDENTIFICATION.pack(**values))) as port:
+        with pytest.warns(UserWarning, match=r"has version 4, this program reads 3; update cube"):
+            open_target(port, "cubestar").close()
+        known = values | {"InterfaceVersion": interface.version}
+    with answering(lambda _data: encode_frame(IDENTIFICATION.pack(**known))) as port:
+        open_target(port, "cubestar").close()
+
+
 def test_each_device_has_a_node_type_of_its_own() -> None:
     types = [diagnosis.node_type_of(one.interface) for one in devices()]
     assert len({*types}) == len(types)

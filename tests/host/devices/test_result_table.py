@@ -3,6 +3,7 @@ import io
 from collections import Counter
 from itertools import islice
 from types import SimpleNamespace as Namespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from cubestack.host.devices.registry import device
 from cubestack.host.devices.result_table import log_lines, scatter
 from cubestack.host.devices.shown_settings import settings
 from cubestack.host.errors import NoAnswerError, TargetError
+from cubestack.host.targets import Target
 from tests.conftest import Run
 
 
@@ -98,7 +100,8 @@ def test_errors_before_the_first_result_are_written(
     ]
     lines[2]["alpha_deg"] = lines[4]["alpha_deg"] = 1.5
     device = Namespace(client=lambda _node: None)
-    target = Namespace(device=device, node=None, controls=None, close=lambda: None)
+    none: Any = None
+    target = Target("", CUBESENSE, none, device=cast("Any", device))
     shell = Namespace(execute=lambda _command: None)
     for name, it in (("open_any_target", target), ("Shell", shell), ("log_lines", iter(lines))):
         monkeypatch.setattr(

@@ -61,7 +61,7 @@ def test_board_that_does_not_answer_says_why(channel: Answers, text: str) -> Non
 def test_other_version_of_the_protocol_is_named() -> None:
     channel = DirectChannel(model(BOARD))
     channel.board.identity = replace(channel.board.identity, version=9)
-    with pytest.raises(DevboardError, match="has version 9 of the protocol, not"):
+    with pytest.raises(DevboardError, match="protocol of the board has version 9, this"):
         engine_on(channel, BAUD, BOARD)
 
 
