@@ -202,6 +202,8 @@ void iss_set_register(IssMachine *machine, int32_t number, uint32_t value) {
 
 // As a debugger: without side effects. Returns the number of bytes read.
 int64_t iss_peek(IssMachine *machine, uint32_t address, uint8_t *out, int64_t count) {
+    if (machine->link)
+        machine->link->show();
     for (int64_t n = 0; n < count; n++) {
         // Registers of peripherals can only be read as words.
         const uint32_t at = address + (uint32_t)n;
@@ -268,6 +270,8 @@ void iss_pin(IssMachine *machine, int32_t port, int32_t bit, int32_t level) {
 }
 
 int32_t iss_pin_level(const IssMachine *machine, int32_t port, int32_t bit) {
+    if (machine->link)
+        machine->link->show();
     return machine->part ? machine->part->gpio->level(port, bit) : 0;
 }
 

@@ -38,7 +38,7 @@ struct FpgaWire {
 
 class FpgaLink : public efm32gg::AttachedCircuit {
 public:
-    // Delay of pin interrupts after a change of a pin.
+    // Pin interrupts come at the multiple of this time after a change of a pin.
     static constexpr int64_t POLL_INTERVAL = efm32gg::MICROSECOND;
 
     FpgaLink(efm32gg::Part &part, const FpgaDriver &fpga, const FpgaWire *given, int32_t count)
@@ -80,10 +80,24 @@ public:
         return answer >= 0;
     }
 
+    void heed_changing(int64_t now) override {
+        if (running && !polling.pending())
+            advance(now - now % POLL_INTERVAL);
+    }
+
+    void heed_changed(int64_t now) override { schedule_poll(now); }
+
     // Running cameras, one bit each.
     void set_running(uint32_t mask) {
         running = mask;
         schedule_poll(part.now());
+        report(part.now());
+    }
+
+    // Brings the levels of the part's pins up to date, which without polls are those of the last
+    // access.
+    void show() {
+        advance(part.now());
         report(part.now());
     }
 
@@ -136,10 +150,18 @@ private:
         schedule_poll(now);
     }
 
+    // Polls only while a change of a pin does more than what the program sees when it reads it.
     void schedule_poll(int64_t now) {
-        if (running)
-            part.schedule(polling, now + POLL_INTERVAL);
+        if (running && heeded())
+            part.schedule(polling, now - now % POLL_INTERVAL + POLL_INTERVAL);
         else
             part.cancel(polling);
+    }
+
+    bool heeded() const {
+        for (const FpgaWire &wire : wires)
+            for (int bit = 0; bit < wire.width && wire.alert; bit++)
+                if (part.gpio->heeds(wire.port, wire.bit + bit)) return true;
+        return false;
     }
 };

@@ -66,7 +66,8 @@ class FirmwareProcessor:
         causes: the part's reset cause bits, by the cause given to ``reset``.
         couple: connects the machine's pins to an FPGA.
         look_ahead_ps: longest run of the machine: less than the time of a byte on the wires, so
-            what a host begins to send while the machine is ahead arrives after the run.
+            what a host begins to send while the machine is ahead arrives after the run. Longer
+            where the host does nothing before ``Kernel.idle_until``.
         on_activity: called when the core falls asleep (False) or wakes (True).
         console: receives the text that the program prints on its debug channels, line by line.
         on_fault: called with a text when a fault stops the program for good.
@@ -254,11 +255,12 @@ class FirmwareProcessor:
     def _run_limit_ps(self) -> int:
         """The time before which no other event happens."""
         now_ps, horizon = self.env.now, self.env.horizon()
+        ahead_ps = max(now_ps + self.look_ahead_ps, self.env.idle_until)
         if horizon is None:
-            return now_ps + self.look_ahead_ps
+            return ahead_ps
         if horizon <= now_ps:
             return now_ps + QUANTUM_PS
-        return min(horizon, now_ps + self.look_ahead_ps)
+        return min(horizon, ahead_ps)
 
     def _sleeps(self, stop: Stop) -> bool:
         machine = self.machine

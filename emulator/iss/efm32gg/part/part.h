@@ -74,6 +74,10 @@ public:
     // Outputs in `changed`, all in `part_outputs`, took `levels` at `now`.
     virtual void outputs_changed(int port, uint32_t changed, uint32_t levels, int64_t now) = 0;
 
+    // What a change of a pin does (Gpio::heeds) is about to change, and has changed.
+    virtual void heed_changing(int64_t now) = 0;
+    virtual void heed_changed(int64_t now) = 0;
+
     // Access to one byte of the external bus beyond the part's own arrays; false: no answer.
     virtual bool bus_access(int bank, uint32_t address, uint8_t &value, bool write,
                             int64_t now) = 0;

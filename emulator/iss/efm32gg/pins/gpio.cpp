@@ -84,7 +84,7 @@ void Gpio::write(uint32_t offset, uint32_t value) {
         if (value & CMD_EM4WUCLR)
             reg(EM4WUCAUSE) = 0;
     } else {
-        Peripheral::write(offset, value);
+        change_heed([&] { Peripheral::write(offset, value); });
     }
 }
 
@@ -209,8 +209,7 @@ void Gpio::set_levels(int port, uint32_t now_levels) {
 void Gpio::edge(int port, int bit, bool level) {
     check_em4(port, bit, level);
     if (mode(port, bit) == DISABLED) return;
-    const uint32_t select = reg(bit < 8 ? EXTIPSELL : EXTIPSELH) >> 4 * (bit % 8) & 7;
-    if ((int)select == port) {
+    if (interrupting_port(bit) == port) {
         if (reg(INSENSE) & INSENSE_INT && reg(level ? EXTIRISE : EXTIFALL) >> bit & 1)
             raise(1u << bit);
         if (reg(INSENSE) & INSENSE_PRS)
@@ -218,6 +217,17 @@ void Gpio::edge(int port, int bit, bool level) {
     }
     for (Peripheral *one : listeners)
         one->pin_changed(port, bit, level);
+}
+
+int Gpio::interrupting_port(int bit) const {
+    return (int)(reg(bit < 8 ? EXTIPSELL : EXTIPSELH) >> 4 * (bit % 8) & 7);
+}
+
+bool Gpio::heeds(int port, int bit) const {
+    const bool interrupts = (reg(EXTIRISE) | reg(EXTIFALL)) >> bit & 1;
+    return !listeners.empty() || reg(EM4WUEN) ||
+           (interrupting_port(bit) == port &&
+            (interrupts || part.prs->listens(PRS_SOURCE + bit / 8, bit % 8)));
 }
 
 void Gpio::update_interrupts() {

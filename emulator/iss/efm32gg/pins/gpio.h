@@ -30,7 +30,19 @@ public:
     int drivable(int pin) const { return pin >= 0 && mode(pin / PINS, pin % PINS) >= 4 ? pin : -1; }
 
     // Calls Peripheral::pin_changed of `unit` for every change of a pin.
-    void listen(Peripheral &unit) { listeners.push_back(&unit); }
+    void listen(Peripheral &unit) {
+        change_heed([&] { listeners.push_back(&unit); });
+    }
+
+    // Whether a change of a pin may do more than change its level.
+    bool heeds(int port, int bit) const;
+
+    // Performs `set`, which may change what `heeds` returns.
+    template <class Set> void change_heed(Set set) {
+        if (part.attached) part.attached->heed_changing(part.now());
+        set();
+        if (part.attached) part.attached->heed_changed(part.now());
+    }
 
     // Drives a pin from outside the part; level -1 releases it.
     void drive_from_outside(int port, int bit, int level);
@@ -58,6 +70,8 @@ private:
     void refresh(int port, uint32_t pins);
     void set_levels(int port, uint32_t now_levels);
     void edge(int port, int bit, bool level);
+    // The port that can interrupt with its pin `bit` (EXTIPSEL).
+    int interrupting_port(int bit) const;
     void modes_changed(int port);
     void check_em4(int port, int bit, bool level);
 };

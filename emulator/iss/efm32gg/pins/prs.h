@@ -28,13 +28,15 @@ public:
                     output_pulse(channel);
             return;
         }
-        uint32_t before = 0;
-        for (int channel = 0; channel < CHANNELS; channel++)
-            before |= (uint32_t)input(channel) << channel;
-        Peripheral::write(offset, value);
-        find_selected();
-        for (int channel = 0; channel < CHANNELS; channel++)
-            update(channel, before >> channel & 1);
+        part.gpio->change_heed([&] {
+            uint32_t before = 0;
+            for (int channel = 0; channel < CHANNELS; channel++)
+                before |= (uint32_t)input(channel) << channel;
+            Peripheral::write(offset, value);
+            find_selected();
+            for (int channel = 0; channel < CHANNELS; channel++)
+                update(channel, before >> channel & 1);
+        });
     }
 
     // Sets a producer's signal, or pulses it for one clock. Sources and signals have the numbers

@@ -97,9 +97,10 @@ void Timer::write(uint32_t offset, uint32_t value) {
             for (int n = 0; n < CHANNELS; n++)
                 part.gpio->release(signals + n, this);
     }
-    const uint32_t starts = CTRL_RISEA | CTRL_FALLA;
-    if (!listening && ((offset == CTRL && (value & starts || field(value, CTRL_CLKSEL))) ||
-                       cc_mode(0) == CAPTURE || cc_mode(1) == CAPTURE || cc_mode(2) == CAPTURE)) {
+    const bool starts = reg(CTRL) & (CTRL_RISEA | CTRL_FALLA),
+               counts_pin = field(reg(CTRL), CTRL_CLKSEL) == CHANNEL_1;
+    if (!listening && (starts || counts_pin || cc_mode(0) == CAPTURE || cc_mode(1) == CAPTURE ||
+                       cc_mode(2) == CAPTURE)) {
         part.gpio->listen(*this);
         listening = true;
     }

@@ -7,7 +7,7 @@ from cubestack.emulator.boards.cubestar.firmware import CubeStarFirmwareBoard
 from cubestack.emulator.iss.image import Image, load_image
 from cubestack.emulator.iss.outcome import Outgoing, OutgoingKind
 from cubestack.emulator.scene.sky import SkyScene
-from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S
+from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S, PS_PER_US
 from cubestack.firmware_model.interface.cameras.mlx75412 import REGISTERS
 from cubestack.firmware_model.interface.cubestar import processor_pins as wired
 from cubestack.firmware_model.interface.cubestar.pins import Layout
@@ -27,8 +27,9 @@ def images(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Image]:
     return {name: load_image(build(name, folder)) for name in ("toggle", "picture")}
 
 
-def powered(image: Image, **options: Any) -> CubeStarFirmwareBoard:
+def powered(image: Image, late: int = 0, **options: Any) -> CubeStarFirmwareBoard:
     board = CubeStarFirmwareBoard(SKY, image, seed=3, **options)
+    board.machine.ram[RESULTS : RESULTS + 64].view(np.uint32)[:] = [0] * 8 + [late] * 8
     assert board.camera.i2c_write(REGISTERS.i2c_address, b"\x81\x00\x21", 0)
     return board
 
@@ -69,6 +70,38 @@ def test_firmware_reads_the_image_through_the_fpga_into_external_memory(
     assert len(np.unique(picture)) > 10
     assert board.truth() is not None
     assert not board.engine.violation_counts
+    board.close()
+
+
+def test_acknowledge_interrupts_at_a_microsecond_whenever_that_is_enabled(
+    images: dict[str, Image],
+) -> None:
+    """Without an enabled interrupt nobody looks at the pin between the program's own reads."""
+    woken = set()
+    for late in (0, 48_000, 960_007):
+        board = powered(images["picture"], late, engine="compiled")
+        while not (cycles := board.machine.ram[RESULTS : RESULTS + 4].view(np.uint32)[0]):
+            board.kernel.advance_to(board.kernel.now + PS_PER_MS)
+        woken.add(int(cycles))
+        board.close()
+    assert len(woken) == 1
+    rose = woken.pop()
+    assert rose > 960_007
+    board = powered(images["picture"], rose + 480, engine="compiled")
+    board.kernel.idle_until = 2 * rose * PS_PER_S // 48_000_000  # one run of the machine
+    board.kernel.advance_to(board.kernel.idle_until)
+    assert board.engine.get_pin("ACK")
+    assert not board.machine.ram[RESULTS]  # the change was before
+    board.close()
+
+
+def test_levels_of_pins_are_those_of_the_fpga(images: dict[str, Image]) -> None:
+    board = powered(images["picture"], late=1 << 31, engine="compiled")
+    seen = 0
+    while not seen:  # the program never reads it
+        board.kernel.advance_to(board.kernel.now + 100 * PS_PER_US)
+        seen = board.machine.pin_level(*divmod(pin_number(wired.FPGA["ACK"]), 16))
+        assert seen == board.engine.get_pin("ACK")
     board.close()
 
 

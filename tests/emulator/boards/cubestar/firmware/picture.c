@@ -1,5 +1,8 @@
-// Stores a whole frame, sleeping until ACK's interrupt, and strobes it over into the external SRAM.
+// Stores a whole frame, sleeping until ACK's interrupt, which it enables at cycle LATE, and strobes
+// it over into the external SRAM.
 #include "board.h"
+
+#define LATE RAM_RESULTS[8]
 
 static volatile uint32_t woken_at;
 
@@ -27,11 +30,12 @@ int main(void) {
     start_external_ram();
     volatile uint8_t *const memory = (volatile uint8_t *)0x80000000;
     volatile uint32_t *const out = RAM_RESULTS;
+    set(FPGA_ENABLE, 1);
+    while (CYCLES < LATE) {}
     GPIO->EXTIPSELH = 0;  // PA12
     GPIO->EXTIRISE = 1u << FPGA_ACK % 16;
     GPIO->IEN = 1u << FPGA_ACK % 16;
     *(volatile uint32_t *)0xE000E100 = 1u << 1;
-    set(FPGA_ENABLE, 1);
     while (!woken_at)
         __asm volatile("wfi");
     out[0] = woken_at;
