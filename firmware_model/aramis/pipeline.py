@@ -49,12 +49,12 @@ BLIND = 240  #: level from which no star differs from its surroundings
 SPIKE_SIGMAS = 8.0  #: lowest excess of a spike over its surroundings, in standard deviations
 
 
-#: Share of hit pixels: one in a window of 25, which distinguishes a spike from a star.
-MOST_HIT = 0.04
-
-#: Share of the field: the Moon's disc with its glare, not a bright star. Counts: a dark sky stays
-#: below both. Pixels above noise that no star explains: a quiet picture has fewer (all measured).
-LIMITS = DisturbanceLimits(saturated=0.004, background=20.0, background_range=10.0, spikes=40)
+#: Shares of the field: the Moon's disc with its glare, not a bright star; the Earth on a third of
+#: it. Counts: a dark sky stays below. Hot pixels and particles: one in a window of 25, which
+#: distinguishes a spike from a star. Emulated skies below these limits are solved.
+LIMITS = DisturbanceLimits(
+    saturated=0.004, background=20.0, background_range=10.0, enough=25, blind=0.3, spikes=33_000
+)
 
 WIDE_PX = 2500  #: a bright region that no star fills
 
@@ -184,8 +184,6 @@ def solve(
         stars = found
     if exposure_rows is not None:
         stars = replace(stars, skew_px=stars.smear_px * field.rows / exposure_rows)
-    if is_hit(stars, field):
-        return unsolved(Reason.RADIATION, stars)
     solution = identify(stars, field, profile, database, meter, hint, until)
     return replace(solution, reason=true_reason(solution))
 
@@ -235,16 +233,12 @@ def detect_locally(
     return StarList(kept.centroids, kept.brightness, smear_px, sigma_px=kept.sigma_px, light=light)
 
 
-def is_hit(stars: StarList, field: CameraField) -> bool:
-    """Whether the image has too many particle hits for reliable stars."""
-    return stars.light is not None and stars.light.spikes > MOST_HIT * field.pixels
-
-
 def true_reason(solution: Solution) -> Reason:
-    """The reason of a solution; without attitude, what disturbed the picture."""
+    """The reason of a solution; without attitude, what disturbed the picture and explains it."""
     light = solution.measured.light
     found = solution.outcome is not MeasurementOutcome.NONE
     if light is None or found or solution.reason not in _OPEN:
         return solution.reason
-    disturbance = LIMITS.exceeded(light, large=light.widest > WIDE_PX)
+    stars = len(solution.measured)
+    disturbance = LIMITS.exceeded(light, stars, large=light.widest > WIDE_PX)
     return solution.reason if disturbance is None else Reason[disturbance.name]

@@ -68,14 +68,13 @@ class Profile(DeclaredValues):
     hint_tolerance_deg: float = number(
         6.0, "with a rough direction, a boresight farther from it is refused", 0, 180
     )
-    smear_px: float = number(
-        4.0, "where stars are drawn out farther, that is why there is no attitude", 1, 1000
-    )
-    skew_px: float = number(
-        4.0, "stars that also moved farther from row to row are refused", 0, 1000
-    )
+    smear_px: float = number(4.0, "stars that are drawn out farther moved", 1, 1000)
     moved_px: float = number(
-        1.8, "the same where the turn about the boresight is too uncertain", 0, 1000
+        1.8,
+        "stars that moved farther from row to row are refused where the turn about the boresight "
+        "is too uncertain",
+        0,
+        1000,
     )
     lens_doubt: float = number(
         0.0, "probability that the lens is not as described, before the picture", 0, 1

@@ -1,8 +1,8 @@
 """The rating of an attitude, and what disturbs a picture that has none.
 
-A disturbance is the cause and the failure to identify stars its effect, so it is reported first: a
-picture at the end of its scale, a bright or uneven sky, streaks, spikes. Only an undisturbed
-picture is said to have too few stars. A sensor's limits are well above its undisturbed sky.
+A disturbance is reported where it explains that no stars were identified: light where it hides
+stars, so that few are found or a large part of the field is blind; streaks and spikes where they
+are so many that others have no attitude for them. Otherwise the search's own outcome is reported.
 """
 
 import math
@@ -79,27 +79,37 @@ class SkyStatistics:
 
 @dataclass(frozen=True)
 class DisturbanceLimits:
-    """Largest values of an undisturbed picture; ``spikes_per_dn``: more spikes per DN of noise."""
+    """Largest values that do not explain a failure: ``saturated`` to ``background_range`` of a
+    picture with fewer than ``enough`` stars, ``blind`` and ``spikes`` of any."""
 
     saturated: float
     background: float
     background_range: float
+    enough: int
+    blind: float
     spikes: int
-    spikes_per_dn: float = 0.0
 
     def exceeded(
-        self, sky: SkyStatistics, *, large: bool = False, smear: bool = False, tracks: bool = False
+        self,
+        sky: SkyStatistics,
+        stars: int,
+        *,
+        large: bool = False,
+        smear: bool = False,
+        tracks: bool = False,
     ) -> Disturbance | None:
-        """The gravest disturbance, None if there is none. ``large``: an area that no star fills;
-        ``smear``: streaks in one direction; ``tracks``: in many."""
-        spikes = self.spikes + self.spikes_per_dn * sky.noise
+        """The gravest disturbance that explains a failure with ``stars`` found, None if none does.
+        ``large``: an area that no star fills; ``smear``: streaks in one direction; ``tracks``: in
+        many."""
+        few = stars < self.enough
         stray_light = (
             sky.background > self.background or sky.background_range > self.background_range
         )
+        is_full = large or sky.saturated > self.saturated
         found = {
-            Disturbance.SATURATED: large or sky.saturated > self.saturated,
-            Disturbance.STRAY_LIGHT: stray_light,
+            Disturbance.SATURATED: sky.saturated > self.blind or (few and is_full),
+            Disturbance.STRAY_LIGHT: few and stray_light,
             Disturbance.SMEAR: smear,
-            Disturbance.RADIATION: tracks or sky.spikes > spikes,
+            Disturbance.RADIATION: tracks or sky.spikes > self.spikes,
         }
         return next((disturbance for disturbance, present in found.items() if present), None)

@@ -7,6 +7,7 @@ where stars moved, fitted to its stars, and refused where its angles are too unc
 """
 
 from dataclasses import replace
+from math import sqrt
 
 import numpy as np
 
@@ -57,10 +58,8 @@ def identify_confirmed(
     sigma_px = measured.sigma_px
     if sigma_px is None:
         sigma_px = np.full(len(measured), profile.sigma_rad / field.scale[1], np.float32)
-    smeared = measured.smear_px > profile.smear_px
-    if smeared and measured.skew_px > profile.skew_px:
-        return unsolved(Reason.SMEAR, measured)
     if len(measured) < FEWEST_STARS:
+        smeared = measured.smear_px > profile.smear_px
         return unsolved(Reason.SMEAR if smeared else Reason.TOO_FEW_STARS, measured)
     directions = field.directions(measured.centroids, meter)
     stars = DatabaseStars(database.vectors)
@@ -80,9 +79,17 @@ def identify_confirmed(
             reason = Reason.NO_TIME
         solution = unsolved(reason, measured, candidates=min(triples.matches, 0xFFFF))
     solution = replace(solution, triples=triples.triples)
-    if smeared and solution.outcome is MeasurementOutcome.NONE:
+    if solution.outcome is MeasurementOutcome.NONE and _is_drawn_out(measured, field, profile):
         return replace(solution, reason=Reason.SMEAR)
     return solution
+
+
+def _is_drawn_out(measured: StarList, field: CameraField, profile: Profile) -> bool:
+    """Whether motion explains that the stars are not at their places: between the first row and the
+    last, or as pieces of streaks, they moved farther than the tolerance."""
+    pieces_px = measured.smear_px / sqrt(12)  # standard deviation of a place on a streak
+    reach_px = profile.tolerance_rad / field.scale[1]
+    return measured.smear_px > profile.smear_px and max(measured.skew_px, pieces_px) > reach_px
 
 
 def _solution(

@@ -105,10 +105,7 @@ class Processing:
             self.state.quality = estimate.picture_values(self.results, reason)
 
     def _report_outcome(self, outcome: MatchOutcome) -> None:
-        detection = self.results.detection
-        self._report(
-            estimate.reason_of(None if detection is None else detection.statistics, outcome)
-        )
+        self._report(estimate.reason_of(self.results.detection, outcome))
 
     # --- detection ----------------------------------------------------------------------------
 

@@ -23,7 +23,7 @@ from cubestack.firmware_model.attitude.geometry import (
 from cubestack.firmware_model.attitude.lens_doubt import judge_lens
 from cubestack.firmware_model.attitude.quest import quest
 from cubestack.firmware_model.attitude.robust_fit import robust_fit
-from cubestack.firmware_model.cubestar.detection.contract import PictureStatistics
+from cubestack.firmware_model.cubestar.detection.contract import Detection
 from cubestack.firmware_model.cubestar.matching.identification import Identification
 from cubestack.firmware_model.cubestar.processing.identify import Results
 from cubestack.firmware_model.cubestar.state import UNRATED
@@ -118,14 +118,14 @@ def _sigmas(
 
 
 #: The brightest stars fill a few pixels each, and 1e-3 are 500; brightness and differences are more
-#: than noise of 4 DN feigns; a new sensor shows 20 spikes, and noise 40 more for each DN.
+#: than noise feigns. Emulated skies below these limits are solved.
 LIMITS = DisturbanceLimits(
-    saturated=1e-3, background=40.0, background_range=5.0, spikes=60, spikes_per_dn=40
+    saturated=1e-3, background=40.0, background_range=15.0, enough=20, blind=0.3, spikes=20_000
 )
 
 STREAKS = 3
 ALIGNED = 0.6  #: share of all areas that are drawn out in the same way, as of a turning camera
-TRACKS = 10  #: areas drawn out in directions of their own; a limb's pieces are beside a large area
+TRACKS = 15  #: areas drawn out in directions of their own; a limb's pieces are beside a large area
 
 _OTHERS = {
     MatchOutcome.TOO_FEW_CENTROIDS: Reason.TOO_FEW_STARS,
@@ -133,12 +133,17 @@ _OTHERS = {
 }
 
 
-def reason_of(picture: PictureStatistics | None, outcome: MatchOutcome) -> Reason:
-    """Why an identification ended with ``outcome``; None for a picture without statistics."""
-    if picture is not None:
-        smear = picture.elongated >= STREAKS and picture.aligned >= ALIGNED
-        tracks = picture.elongated >= TRACKS and not picture.large
-        disturbance = LIMITS.exceeded(picture, smear=smear, tracks=tracks)
+def reason_of(detection: Detection | None, outcome: MatchOutcome) -> Reason:
+    """Why an identification ended with ``outcome``: what disturbed the picture, if its search
+    measured that and it explains the failure."""
+    picture = None if detection is None else detection.statistics
+    if detection is not None and picture is not None:
+        disturbance = LIMITS.exceeded(
+            picture,
+            len(detection.centroids),
+            smear=picture.elongated >= STREAKS and picture.aligned >= ALIGNED,
+            tracks=picture.elongated >= TRACKS and not picture.large,
+        )
         if disturbance is not None:
             return Reason[disturbance.name]
     return _OTHERS[outcome] if outcome in _OTHERS else Reason[outcome.name]

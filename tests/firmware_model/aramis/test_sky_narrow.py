@@ -31,14 +31,17 @@ FIELD = CameraField(2 * degrees(atan(580 * 0.0083 / 2 / 20)), 752, 580, 0.0086, 
 ONBOARD = CatalogueParameters(fov_deg=18, epoch=2014.8)
 
 
-def solved(path: Path, configuration: Configuration, aided: bool) -> tuple[Solution, Rotation]:
+def solved(
+    path: Path, configuration: Configuration, aided: bool, exposure_rows: int | None = None
+) -> tuple[Solution, Rotation]:
     image = json.loads((FOLDER / "truth.json").read_text())["images"][path.name]
     truth = Rotation.from_quat(image["quaternion_xyzw_inertial_to_camera"])
     with Image.open(path) as opened:
         picture = np.repeat(np.asarray(opened), 2, axis=0)
     hint = truth.inv().apply([0.03, 0.02, 1.0]).astype(np.float32) if aided else None
     own = replace(configuration, field=FIELD)
-    return solve(picture, LevelHistory(), own, database(ONBOARD), meter(), hint), truth
+    stars, past = database(ONBOARD), LevelHistory()
+    return solve(picture, past, own, stars, meter(), hint, exposure_rows), truth
 
 
 @pytest.mark.parametrize("path", PICTURES, ids=lambda path: str(path.stem))
@@ -49,6 +52,14 @@ def test_narrow_sky_images_are_solved(path: Path, aided: bool) -> None:
     cross, roll = errors_deg(solution.quaternion, truth)
     assert cross < 0.05
     assert roll < 0.2
+
+
+@pytest.mark.parametrize("path", PICTURES, ids=lambda path: str(path.stem))
+def test_spots_that_the_lens_draws_out_are_no_motion(path: Path) -> None:
+    """Their length over this exposure would be a shift of 4 px and more between rows."""
+    solution, truth = solved(path, VERIFIED, aided=False, exposure_rows=700)
+    assert solution.outcome is MeasurementOutcome.CONCLUSIVE
+    assert errors_deg(solution.quaternion, truth)[0] < 0.05
 
 
 @pytest.mark.parametrize("aided", [False, True])

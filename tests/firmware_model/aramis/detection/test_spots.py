@@ -212,13 +212,3 @@ def test_smear_is_the_reason_when_there_is_no_attitude() -> None:
     for smear, reason in ((9.0, Reason.SMEAR), (2.0, Reason.TOO_FEW_STARS)):
         found = identify(StarList(*few, smear), FIELD, VERIFIED.profile, database(), meter())
         assert (found.outcome, found.reason) == (MeasurementOutcome.NONE, reason)
-
-
-def test_skewed_image_is_refused_and_smeared_image_is_not() -> None:
-    made = picture(np.random.default_rng(2), FIELD).stars
-    for skew, outcome in ((1.0, MeasurementOutcome.CONCLUSIVE), (9.0, MeasurementOutcome.NONE)):
-        stars = StarList(made.centroids, made.brightness, 20.0, skew)
-        found = identify(stars, FIELD, VERIFIED.profile, database(), meter())
-        assert found.outcome is outcome
-    still = StarList(made.centroids, made.brightness, 2.0, 9.0)
-    assert identify(still, FIELD, VERIFIED.profile, database(), meter()).quaternion is not None

@@ -7,7 +7,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
-from cubestack.firmware_model.cubestar.detection.contract import PictureStatistics
+from cubestack.firmware_model.cubestar.detection.contract import (
+    Detection,
+    PictureStatistics,
+    SearchEnd,
+)
 from cubestack.firmware_model.cubestar.processing.estimate import reason_of
 from cubestack.firmware_model.cubestar.state import UNRATED
 from cubestack.firmware_model.interface.cubestar import Reason
@@ -42,33 +46,44 @@ def quality(unit: Harness, picture: np.ndarray) -> dict[str, float]:
     return unit.telemetry("Quality")
 
 
+def detection(stars: int, picture: PictureStatistics | None) -> Detection:
+    places, counts = np.zeros((stars, 2), np.float32), np.zeros(stars, np.uint16)
+    sizes = counts.astype(np.uint8)
+    return Detection(places, sizes, counts, 0, 0, 0, SearchEnd.COMPLETE, statistics=picture)
+
+
 @pytest.mark.parametrize(
-    ("measured", "reason"),
+    ("measured", "stars", "reason"),
     [
-        ({}, Reason.UNCONFIRMED),
-        ({"saturated": 0.01}, Reason.SATURATED),
-        ({"background_range": 30.0}, Reason.STRAY_LIGHT),
-        ({"background": 120.0}, Reason.STRAY_LIGHT),
-        ({"background": 40.0}, Reason.UNCONFIRMED),
-        ({"background": 40.5}, Reason.STRAY_LIGHT),
-        ({"background_range": 30.0, "spikes": 500}, Reason.STRAY_LIGHT),
-        ({"spikes": 500}, Reason.RADIATION),
-        ({"spikes": 100, "noise": 4.0}, Reason.UNCONFIRMED),
-        ({"elongated": 12, "aligned": 0.2}, Reason.RADIATION),
-        ({"elongated": 6, "aligned": 0.9}, Reason.SMEAR),
-        ({"elongated": 2, "aligned": 0.9}, Reason.UNCONFIRMED),
+        ({}, 5, Reason.UNCONFIRMED),
+        ({"saturated": 0.01}, 5, Reason.SATURATED),
+        ({"saturated": 0.01}, 40, Reason.UNCONFIRMED),
+        ({"saturated": 0.31}, 40, Reason.SATURATED),
+        ({"background_range": 30.0}, 5, Reason.STRAY_LIGHT),
+        ({"background_range": 30.0}, 40, Reason.UNCONFIRMED),
+        ({"background": 120.0}, 19, Reason.STRAY_LIGHT),
+        ({"background": 120.0}, 20, Reason.UNCONFIRMED),
+        ({"background": 40.0}, 5, Reason.UNCONFIRMED),
+        ({"background": 40.5}, 5, Reason.STRAY_LIGHT),
+        ({"background_range": 30.0, "spikes": 50_000}, 5, Reason.STRAY_LIGHT),
+        ({"spikes": 50_000}, 40, Reason.RADIATION),
+        ({"spikes": 15_000}, 5, Reason.UNCONFIRMED),
+        ({"elongated": 6, "aligned": 0.9}, 40, Reason.SMEAR),
+        ({"elongated": 2, "aligned": 0.9}, 40, Reason.UNCONFIRMED),
     ],
 )
-def test_image_reason_precedes_failure_reason(measured: dict[str, float], reason: Reason) -> None:
+def test_disturbance_is_the_reason_where_it_explains_the_failure(
+    measured: dict[str, float], stars: int, reason: Reason
+) -> None:
     picture = replace(CLEAR, **measured)  # type: ignore[arg-type]
-    assert reason_of(picture, MatchOutcome.UNCONFIRMED) is reason
+    assert reason_of(detection(stars, picture), MatchOutcome.UNCONFIRMED) is reason
 
 
 @pytest.mark.parametrize("outcome", [o for o in MatchOutcome if o is not MatchOutcome.IDENTIFIED])
 def test_each_failure_has_a_reason(outcome: MatchOutcome) -> None:
-    said = reason_of(CLEAR, outcome)
+    said = reason_of(detection(5, CLEAR), outcome)
     assert said not in (Reason.NOT_RATED, Reason.SOLVED)
-    assert reason_of(None, outcome) is said
+    assert reason_of(detection(5, None), outcome) is reason_of(None, outcome) is said
 
 
 @pytest.mark.parametrize("profile", ["published"])
