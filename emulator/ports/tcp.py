@@ -16,6 +16,9 @@ TCP_RECEIVE_BUFFER = 4096
 MAX_AHEAD = 8 << 20
 """Bytes, more than a sender's buffer of Linux holds (tcp(7), tcp_wmem)."""
 
+MAX_AHEAD_AT_ONCE = 1 << 14
+"""Bytes of a flood that are read between two turns of the device."""
+
 REFUSAL = b"cubestack: this port has a client already\r\n"
 """Plain text, which contains no frame and no telnet command."""
 
@@ -25,7 +28,8 @@ class TcpEndpoint(SerialPort):
 
     A client that has shut down its side still receives the device's output, but a new client
     replaces it; bytes that the old one sent last are lost if the wire was too slow for them. Its
-    end may be behind bytes that the wire has no time for, so they are read when a new client comes.
+    end may be behind bytes that the wire has no time for, so they are read when a new client comes,
+    which waits meanwhile.
     """
 
     scheme = "tcp"
@@ -45,6 +49,7 @@ class TcpEndpoint(SerialPort):
         self._server = listen(host, port, allow_remote=allow_remote)
         self._server.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, TCP_RECEIVE_BUFFER)
         self._client: socket.socket | None = None
+        self._newcomer: socket.socket | None = None
         self._input_ended = False
         self._ahead = bytearray()  # read before the wire had room
         self.address: tuple[str, int] = self._server.getsockname()[:2]
@@ -53,10 +58,12 @@ class TcpEndpoint(SerialPort):
         super().__init__(uart)
 
     def watched(self) -> list[tuple[int, int]]:
-        watched = [(self._server.fileno(), select.POLLIN)]
+        watched = [] if self._newcomer else [(self._server.fileno(), select.POLLIN)]
         if self._client is not None:
             # Even with no events to wait for, poll would report a client that has gone.
             events = self._events(reading=not self._input_ended)
+            if self._newcomer is not None:
+                events |= select.POLLIN
             if self._ahead and self._room() > 0:
                 events |= select.POLLOUT  # at once
             if events:
@@ -66,32 +73,51 @@ class TcpEndpoint(SerialPort):
     def close(self) -> None:
         super().close()
         self._drop()
+        if self._newcomer is not None:
+            self._newcomer.close()
         self._server.close()
 
     def _find_client(self) -> object | None:
-        try:
-            newcomer = self._server.accept()[0]
-        except OSError:  # no client, or it has gone again
+        newcomer, self._newcomer = self._newcomer or self._accept(), None
+        if newcomer is None:
             return self._client
-        newcomer.setblocking(False)
         if self._client is not None and not self._gone(self._client):
-            with contextlib.suppress(OSError):
-                newcomer.send(REFUSAL)
-            newcomer.close()
-            return self._client
+            if self._read_ahead(self._client):
+                self._newcomer = newcomer
+                return self._client
+            if not self._gone(self._client):
+                with contextlib.suppress(OSError):
+                    newcomer.send(REFUSAL)
+                newcomer.close()
+                return self._client
         self._drop()
         newcomer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._client = newcomer
         self._welcome()
         return self._client
 
-    def _gone(self, client: socket.socket) -> bool:
-        """Whether the client has shut down its side; reads ahead to find out."""
-        with contextlib.suppress(OSError):
-            while len(self._ahead) < MAX_AHEAD and (data := client.recv(MAX_AHEAD)):
-                self._ahead += data
+    def _accept(self) -> socket.socket | None:
+        try:
+            newcomer = self._server.accept()[0]
+        except OSError:  # no client, or it has gone again
+            return None
+        newcomer.setblocking(False)
+        return newcomer
+
+    @staticmethod
+    def _gone(client: socket.socket) -> bool:
+        """Whether the client has shut down its side, and all that it sent is here."""
         # poll reports hang-ups and errors in any case.
         return bool(poll_now(client.fileno(), HUNG_UP))
+
+    def _read_ahead(self, client: socket.socket) -> bool:
+        """Read a part of what the client has sent; returns whether there can be more."""
+        left = min(MAX_AHEAD_AT_ONCE, MAX_AHEAD - len(self._ahead))
+        with contextlib.suppress(OSError):
+            while left > 0 and (data := client.recv(left)):
+                self._ahead += data
+                left -= len(data)
+        return left == 0 and len(self._ahead) < MAX_AHEAD
 
     def _welcome(self) -> None: ...
 

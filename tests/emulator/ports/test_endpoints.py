@@ -22,7 +22,7 @@ from cubestack.emulator.ports.gdb import GdbEndpoint
 from cubestack.emulator.ports.pseudo_terminal import PtyEndpoint
 from cubestack.emulator.ports.realtime import wait_ready
 from cubestack.emulator.ports.serial_port import MAX_UNSENT
-from cubestack.emulator.ports.tcp import TcpEndpoint
+from cubestack.emulator.ports.tcp import MAX_AHEAD_AT_ONCE, TCP_RECEIVE_BUFFER, TcpEndpoint
 from tests.emulator.iss.gdb.fake_target import FakeTarget
 
 from .conftest import ALL_BYTES, LOOPBACK, TIMEOUT_S, open_client, ready
@@ -38,6 +38,17 @@ def assert_transparent(port, device, client) -> None:
     assert client.read(256) == ALL_BYTES
     assert client.write(ALL_BYTES) == 256
     assert device.hears(port, 256) == ALL_BYTES
+
+
+def hears(client) -> bool:
+    """Whether something has arrived that it can read."""
+    return bool(select.select([client.fd], [], [], 0)[0])
+
+
+def unsent(client) -> int:
+    """Bytes that it has written and the port has not taken."""
+    count = fcntl.ioctl(client.fd, termios.TIOCOUTQ, bytes(4))
+    return struct.unpack("i", count)[0]
 
 
 def assert_fresh(port, device, client) -> None:
@@ -91,7 +102,26 @@ def test_flood_of_a_client_that_has_left_does_not_keep_the_next_one_out(port, de
             first.socket.send(bytes(1 << 16))
     first.close()
     port.exchange(device.kernel.now)
-    assert_fresh(port, device, connect())
+    second = connect()
+    device.wait_for(lambda: hears(second), doing=lambda: device.sends(port, b"."))
+    assert second.read(1) == b"."
+
+
+@a_tcp
+def test_flood_is_read_in_bounded_parts(port, device, connect):
+    """So that the device has its turn in between, whoever wants to be the next client."""
+    first = connect()
+    first.socket.setblocking(False)
+    with contextlib.suppress(BlockingIOError):
+        while True:
+            first.socket.send(bytes(1 << 16))
+    port.exchange(device.kernel.now)
+    connect()
+    for _ in range(3):
+        before = unsent(first)
+        port.exchange(device.kernel.now)
+        assert unsent(first) >= before - MAX_AHEAD_AT_ONCE - 4 * TCP_RECEIVE_BUFFER
+        assert ready(port)
 
 
 @a_tcp
@@ -105,7 +135,7 @@ def test_client_that_floods_and_stays_keeps_its_bytes(port, device, connect):
             sent += first.socket.send(bytes(range(250)) * 40)
     port.exchange(device.kernel.now)
     with contextlib.closing(open_client(port)) as second:
-        port.exchange(device.kernel.now)
+        device.wait_for(lambda: hears(second), doing=lambda: port.exchange(device.kernel.now))
         assert second.read(10) == b"cubestack:"
     while len(device.received) < sent:
         before = len(device.received)
