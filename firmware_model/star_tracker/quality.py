@@ -1,8 +1,8 @@
 """The rating of an attitude, and what disturbs a picture that has none.
 
 A disturbance is reported where it explains that no stars were identified: light where it hides
-stars, so that few are found or a large part of the field is blind; streaks and spikes where they
-are so many that others have no attitude for them. Otherwise the search's own outcome is reported.
+stars, so that few are found or a large part of the field is blind; streaks and spikes where their
+number or length is beyond what the search bears. Otherwise the search's own outcome is reported.
 """
 
 import math
