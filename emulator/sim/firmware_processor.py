@@ -40,6 +40,9 @@ FAULT_CHECK_PS = 10 * PS_PER_MS
 INPUT_POLL_PS = 10 * PS_PER_MS
 """Period in which a program that waits for console input looks for it."""
 
+MOST_STANDING = 3
+"""Consecutive runs in which a machine may make no progress."""
+
 INWARD = frozenset({OutgoingKind.SLEEP, OutgoingKind.LOG})
 """Outputs that do not count as activity visible outside."""
 
@@ -161,11 +164,14 @@ class FirmwareProcessor:
 
     def catch_up(self) -> None:
         """Run the machine to the kernel's time; call before changing its inputs."""
-        reached_ps = -1
-        while reached_ps < self.machine.now_ps < self.env.now and not self.env.paused:
-            reached_ps = self.machine.now_ps
+        standing = 0  # a run may only wake the machine, or stop for an output
+        while standing < MOST_STANDING and self.machine.now_ps < self.env.now:
+            if self.env.paused:
+                break
+            before_ps = self.machine.now_ps
             self._run_machine(self.env.now)
             self._early.extend(self.machine.outbox())
+            standing = 0 if self.machine.now_ps > before_ps else standing + 1
 
     def wake(self) -> None:
         """Report changed inputs, so that a sleeping machine runs."""
@@ -199,13 +205,14 @@ class FirmwareProcessor:
                     break
                 stop = self._run_without_hook(self._run_limit_ps())
             yield from self._settle(stop)
-            if not self._awake and self._sleeps(stop):
+            # After an output its interrupt may be pending, which wakes it at once.
+            if not self._awake and not stop.sends and self._sleeps(stop):
                 yield from self._sleep()
                 continue
             ahead_ps = stop.now_ps - env.now
             standing = standing + 1 if stop.now_ps == reached_ps and ahead_ps <= 0 else 0
             reached_ps = stop.now_ps
-            if standing > 2:  # a machine that makes no progress must not block the kernel
+            if standing >= MOST_STANDING:  # such a machine must not block the kernel
                 yield from self._await_input(self._run_limit_ps())
                 continue
             yield env.timeout(max(0, ahead_ps))
