@@ -1,8 +1,7 @@
 """The simulator's C++ library: its build, and declarations of api.cpp and insight for ctypes."""
 
 import ctypes
-from collections.abc import Iterable
-from functools import cache, lru_cache, partial
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -174,23 +173,26 @@ def sources() -> list[Path]:
 def simulator_library(folder: Path | None = None) -> Path:
     """See :func:`cubestack.emulator.native.cache.library_of`."""
     header = cxx_header(LAYOUTS)
-    build = partial(_compile, header, sources())
-    recipe = libraries.recipe("the Cortex-M3 simulator", header, sources(), build)
+    recipe = libraries.recipe("the Cortex-M3 simulator", header, sources(), _compile)
     return libraries.library_of(recipe, folder)
 
 
-def _compile(
-    header: str, files: Iterable[Path], compiler: Compiler, scratch: Path, log: Path
-) -> Path:
-    (scratch / "registers.h").write_text(header)
-    units = [file for file in files if file.suffix == ".cpp"]
+def simulator_options(scratch: Path) -> list[str | Path]:
+    """Write the simulator's generated files to ``scratch``; the options that compile it.
+
+    The options are include folders and source files.
+    """
+    (scratch / "registers.h").write_text(cxx_header(LAYOUTS))
+    units = [file for file in sources() if file.suffix == ".cpp"]
     # Peripherals import the names of their registers, and the loop defines many macros.
     apart = [file for file in units if FOLDER / "efm32gg" in file.parents or file == LOOP]
     unity = scratch / "simulator.cpp"
     unity.write_text("".join(f'#include "{file}"\n' for file in units if file not in apart))
-    return compile_library(
-        compiler, scratch / "library.so", log, [f"-I{FOLDER}", f"-I{scratch}", unity, *apart]
-    )
+    return [f"-I{FOLDER}", f"-I{scratch}", unity, *apart]
+
+
+def _compile(compiler: Compiler, scratch: Path, log: Path) -> Path:
+    return compile_library(compiler, scratch / "library.so", log, simulator_options(scratch))
 
 
 @cache

@@ -35,6 +35,20 @@ _CONTROL_PINS = {pin_number(wired.FPGA[name]): name for name in _CONTROLS}
 _SWITCH_PINS = {pin_number(pin): channel for channel, pin in wired.SWITCHES.items()}
 
 
+def coupled_pins() -> list[FpgaPin]:
+    """The connections between processor and FPGA that need no Python."""
+    return [
+        FpgaPin(
+            name,
+            *wired.port_pin(wired.FPGA[name]),
+            width=name.width,
+            input=name in _INPUTS,
+            alert=name is pins.ACK,
+        )
+        for name in (*_INPUTS, pins.DCLK)
+    ]
+
+
 class CubeStarFirmwareBoard(OwnFirmwareBoard, CubeStarStack):
     """One emulated CubeStar with a user's firmware."""
 
@@ -90,17 +104,7 @@ class CubeStarFirmwareBoard(OwnFirmwareBoard, CubeStarStack):
     # --- pins -----------------------------------------------------------------------------------
 
     def _couple(self, fpga: FpgaPort, *, compiled: bool) -> FpgaCoupling:
-        found = [
-            FpgaPin(
-                name,
-                *wired.port_pin(wired.FPGA[name]),
-                width=name.width,
-                input=name in _INPUTS,
-                alert=name is pins.ACK,
-            )
-            for name in (*_INPUTS, pins.DCLK)
-        ]
-        self._coupling = FpgaCoupling(self.machine, fpga, found, compiled=compiled)
+        self._coupling = FpgaCoupling(self.machine, fpga, coupled_pins(), compiled=compiled)
         return self._coupling
 
     def _pin(self, one: Outgoing) -> None:

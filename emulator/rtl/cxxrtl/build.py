@@ -18,7 +18,7 @@ from cubestack.hdl.flow.generate import (
     yosys_version,
 )
 
-_FOLDER = Path(__file__).parent
+FOLDER = Path(__file__).parent
 
 SOURCES = (
     "*.cpp",
@@ -43,7 +43,7 @@ def driver_library(name: str, design: str, build: cache.Build, folder: Path | No
 
     See :func:`cubestack.emulator.native.cache.library_of`.
     """
-    sources = [path for pattern in SOURCES for path in sorted(_FOLDER.glob(pattern))]
+    sources = [path for pattern in SOURCES for path in sorted(FOLDER.glob(pattern))]
     headers = [path.read_bytes() for path in sorted(cxxrtl_headers().glob("**/*.h"))]
     tools = yosys_version().encode(), *headers
     recipe = cache.recipe(f"the FPGA design {name}", design, sources, build, tools)
@@ -57,7 +57,7 @@ def compile_driver(
 
     Raises CompilerError; the message names the log.
     """
-    sources = f"-I{scratch}", f"-I{cxxrtl_headers()}", _FOLDER / "driver.cpp"
+    sources = f"-I{scratch}", f"-I{cxxrtl_headers()}", FOLDER / "driver.cpp"
     return compile_library(compiler, scratch / "library.so", log, [*sources, *options])
 
 
@@ -65,7 +65,8 @@ def compile_driver(
 _design_hash = lru_cache(maxsize=8)(design_hash)
 
 
-def _compile(wiring: Wiring, compiler: Compiler, scratch: Path, log: Path) -> Path:
+def driver_options(wiring: Wiring, scratch: Path) -> list[str]:
+    """Write the design's generated files to ``scratch``; the include folders of driver.cpp."""
     design = edges_after_commit(cxxrtl_text(wiring.component))
     (scratch / "design.cpp").write_text(design)
     rtlil = rtlil_text(wiring.component)
@@ -78,4 +79,9 @@ def _compile(wiring: Wiring, compiler: Compiler, scratch: Path, log: Path) -> Pa
     for number, variant in enumerate(variants):
         (scratch / f"variant_{number}.cpp").write_text(variant)
     (scratch / "pins.h").write_text(pins_header(wiring, design, variants))
+    return [f"-I{scratch}", f"-I{cxxrtl_headers()}", f"-I{FOLDER}"]
+
+
+def _compile(wiring: Wiring, compiler: Compiler, scratch: Path, log: Path) -> Path:
+    driver_options(wiring, scratch)
     return compile_driver(compiler, scratch, log)
