@@ -70,7 +70,12 @@ test: .venv/ready-dev
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[board]"
 	@touch $@
 
-test-all: .venv/ready-board
+# Makes WebAssembly of the page that runs in the browser.
+.venv/ready-compiler: .venv/ready-dev
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[compiler]"
+	@touch $@
+
+test-all: .venv/ready-board .venv/ready-compiler
 	@$(PYTEST) $(TESTS) -m "slow or not slow"
 
 fuzz: .venv/ready-dev
@@ -119,8 +124,9 @@ wheels: .venv/ready-run
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[release]"
 	@SOURCE_DATE_EPOCH=$$(git log -1 --format=%ct) $(BIN)/python -m cubestack.host.native.wheels dist $(PLATFORMS)
 
-docs: .venv/ready-dev
+docs: .venv/ready-compiler
 	@NO_MKDOCS_2_WARNING=1 COLUMNS=90 $(BIN)/mkdocs build --strict --quiet
+	@$(BIN)/python -m docs.make_try
 	@echo "out/site/index.html"
 
 bench-engines: .venv/ready-dev
