@@ -169,10 +169,9 @@ def messages() -> str:
 def skies() -> Iterator[tuple[dict[str, object], bytes]]:
     """Pointing in degrees, and the camera's picture as PNG: Orion, then random directions."""
     generator = np.random.default_rng(SEED)
-    lines = sensor.frame_lines(
-        chip.REGISTERS["CLOCKS_PER_SECOND"].reset,
-        INTERFACE.telecommand("SetFrameRate").field("FrameRate").reset,
-    )
+    rate = INTERFACE.telecommand("SetFrameRate").field("FrameRate").reset
+    assert isinstance(rate, int)
+    lines = sensor.frame_lines(chip.REGISTERS["CLOCKS_PER_SECOND"].reset, rate)
     line = Fraction(chip.LINE_CLOCKS * PS_PER_S, chip.CRYSTAL_HZ)
     imager = Mlx75412Imager(SEED)
     for number in range(SKIES):
