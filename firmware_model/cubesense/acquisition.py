@@ -253,7 +253,7 @@ class Acquisition:
     def _send_address(self, pixel: int) -> Routine[None]:
         """Send a pixel's address to the FPGA; before it answers, the data lines become inputs."""
         y, x = divmod(pixel, fpga.FULL_SIZE.columns)
-        self._meter.charge(i16_add=2, port_write=2)
+        self._meter.charge(address_byte=1, port_write=2)
         for byte in fpga.address_bytes(x, y):
             yield SetPin(pins.DATA_I, byte)
             yield SetPin(pins.CLK, 1)

@@ -23,12 +23,14 @@ from cubestack.firmware_model.interface.cubesense import codes
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE
 from cubestack.firmware_model.interface.cubesense.switches import CubeSenseSwitches
 from cubestack.firmware_model.mcu.costs import Meter
-from cubestack.firmware_model.mcu.pic18 import INSTRUCTION_HZ, PIC18F45K20
+from cubestack.firmware_model.mcu.pic18 import CLOCKS, PIC18F45K20
 from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Routine, pause
 
 PRESCALER = 256
 
-_CYCLES_PER_US = INSTRUCTION_HZ // 1_000_000
+#: Of the timer, in the formula. With switch `clock` at ``oscillator`` the timer is finer than a
+#: processor of that speed could have it, so that times remain comparable.
+_CYCLES_PER_US = CLOCKS["instructions"] // 1_000_000
 
 
 def ticks_of(us: int) -> int:

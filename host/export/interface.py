@@ -139,7 +139,7 @@ def render_switches(title: str, switches: type[Switches], format_name: str) -> s
                 f"{name}: {one.meaning}\n"
                 f"  published  {one.published} ({one.source})\n"
                 f"  extended   {one.extended}\n"
-                + "".join(f"  or         {other}\n" for other in one.choices[2:])
+                + "".join(f"  or         {other}\n" for other in one.others)
                 + textwrap.fill(one.reason, 96, initial_indent="  ", subsequent_indent="  ")
                 + "\n"
                 for name, one in declared.items()
@@ -148,7 +148,8 @@ def render_switches(title: str, switches: type[Switches], format_name: str) -> s
         )
     rows = [
         f"| `{name}` | {one.meaning} | `{one.published}` | "
-        f"{', '.join(f'`{value}`' for value in one.choices[1:])} | {one.source} | {one.reason} |"
+        f"{', '.join(f'`{value}`' for value in (one.extended, *one.others))} | "
+        f"{one.source} | {one.reason} |"
         for name, one in declared.items()
     ]
     head = [

@@ -52,9 +52,6 @@ class CostReport:
     table: Mapping[str, float]  #: cycles that the device's model charges, by name
 
 
-_BEGIN, _END = "<!-- costs -->\n", "<!-- end of costs -->\n"
-
-
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     known = [device.name for device in devices() if "costs" in device.studies]
     parser.add_argument("action", choices=("measure",), help="compile, run, count")
@@ -79,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
                 tell(f"{one.build}, {one.timing}: {sum(one.phases.values()):,} cycles")
     if args.write:
         write_output(report.file, json.dumps(report.as_data(found), indent=1) + "\n")
-        _rewrite(Path("docs") / report.document, report.page(found))
+        rewrite_table(Path("docs") / report.document, "costs", report.page(found))
     elif args.json:
         print(json.dumps(report.as_data(found)))
     else:
@@ -112,9 +109,11 @@ def _show(report: CostReport, found: list[CostMeasurement]) -> None:
     show(table)
 
 
-def _rewrite(page: Path, table: str) -> None:
+def rewrite_table(page: Path, name: str, table: str) -> None:
+    """Replace the table between the page's marks of ``name``; ValueError if it has none."""
+    begin, end = f"<!-- {name} -->\n", f"<!-- end of {name} -->\n"
     text = page.read_text("utf-8")
-    if _BEGIN not in text or _END not in text:
-        raise ValueError(f"{page} has no {_BEGIN.strip()}")
-    before, rest = text.split(_BEGIN)
-    write_output(page, f"{before}{_BEGIN}\n{table}\n\n{_END}{rest.split(_END)[1]}")
+    if begin not in text or end not in text:
+        raise ValueError(f"{page} has no {begin.strip()}")
+    before, rest = text.split(begin)
+    write_output(page, f"{before}{begin}\n{table}\n\n{end}{rest.split(end)[1]}")

@@ -39,7 +39,7 @@ from cubestack.firmware_model.interface.cubesense.switches import (
     CubeSenseSwitches,
 )
 from cubestack.firmware_model.mcu.costs import Meter
-from cubestack.firmware_model.mcu.pic18 import PIC18F45K20
+from cubestack.firmware_model.mcu.pic18 import pic18f45k20
 from cubestack.hdl.cubesense.pair import CubeSensePair
 
 _SRAM = {"standby": 4.6, "active": 7.6}  # fitted, as all below
@@ -150,7 +150,7 @@ class CubeSenseBoard(Board):
         self._commanded: dict[Camera, Action] = dict.fromkeys(Camera, Action.STANDBY)
         self._storing_since_ps: dict[Camera, int] = {}
         self._stored: dict[Camera, RollingShutter] = {}
-        meter = Meter(PIC18F45K20)
+        meter = Meter(pic18f45k20(library=switches.library, clock=switches.clock))
         self.hardware = Pic18f45k20(self, mcu_addressing=mcu_addressing)
 
         def boot(_cause: int) -> CubeSenseProgram:

@@ -28,6 +28,11 @@ class Switch(Declaration):
     reason: str  #: why there is another value
     hardware: bool = False  #: it describes the built board, so no telecommand can change it
 
+    @property
+    def others(self) -> tuple[str, ...]:
+        """Values of neither profile."""
+        return tuple(one for one in self.choices if one not in (self.published, self.extended))
+
 
 def switch(meaning: str, published: str, extended: str, *others: str, **more: Any) -> Any:
     """A switch with the values of the profiles, and others; ``more`` as in `Switch`."""

@@ -66,6 +66,26 @@ class CubeSenseSwitches(Switches):
         "FPGA whole images are sent over the link, for seconds",
         hardware=True,
     )
+    library: str = switch(
+        "costs of the processor's floating-point library",
+        "notes",
+        "notes",
+        "compiled",
+        source="section 6.1.1: Microchip's C18, whose library has no published cycles",
+        reason="notes are Microchip's application note AN575 with the part's multiplier, the "
+        "fastest; compiled is sdcc's library in C, the slowest; every time is between the two",
+        hardware=True,
+    )
+    clock: str = switch(
+        "meaning of the 5 MHz in the formula of the processor's timer",
+        "instructions",
+        "instructions",
+        "oscillator",
+        source="section 7.4: F_OSC = 5 MHz",
+        reason="oscillator is the formula to the letter, four clocks per instruction: the program "
+        "takes four times as long, and the thesis' timer would disagree with its oscilloscope",
+        hardware=True,
+    )
 
 
 DEFAULT_SWITCHES = CubeSenseSwitches()

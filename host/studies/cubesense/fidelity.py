@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from cubestack.emulator.sim.power import PowerModel
 from cubestack.emulator.sim.virtual_time import Kernel
 from cubestack.firmware_model.interface.cameras.ov7620 import COLUMNS, EXPOSURE_LINES, ROWS
 from cubestack.firmware_model.interface.cubesense.codes import Camera
+from cubestack.firmware_model.mcu.pic18 import LIBRARIES
 from cubestack.hdl.cubesense.tops import AREA_FILE
 from cubestack.hdl.flow.area_report import recorded_areas
 from cubestack.host.experiments.cubesense.measure import CubeSenseOpener, SensorResult, view_of
@@ -69,6 +71,23 @@ def _sensor(results: Sequence[SensorResult]) -> Figures:
     figures["sigma_ms"] = phases["total"].std()
     figures["imaging_ms"] = (phases["wait"] + phases["store"]).mean()
     return {name: float(value) for name, value in figures.items()}
+
+
+#: Readings of the processor's speed, by the prefix of their figures.
+SPEEDS = {
+    **{library: f"library={library}" for library in LIBRARIES},
+    "oscillator": "clock=oscillator",
+}
+
+
+def _times(opened: CubeSenseOpener, frames: int, **options: Any) -> Figures:
+    """Time of a measurement, and its sigma, at each of ``SPEEDS``."""
+    figures, each = {}, max(2, frames // len(SPEEDS))
+    for name, speed in SPEEDS.items():
+        board = {**opened.board, "set": ",".join(filter(None, (opened.board.get("set"), speed)))}
+        found = _sensor(list(measure("cubesense", frames=each, seed=2, **board, **options)))  # type: ignore[arg-type]
+        figures |= {f"{name}_{one}": found[one] for one in ("total_ms", "sigma_ms")}
+    return figures
 
 
 def _ball(opened: CubeSenseOpener, frames: int) -> Figures:
@@ -203,9 +222,8 @@ FIDELITY = Fidelity(
         "ball": Trial(_ball, 10, 1, 30, "ball"),
         "nadir": measured("cubesense", _sensor, 300, 4, 40, sensor="nadir", seed=2, units=10),
         "sun": measured("cubesense", _sensor, 300, 6, 25, sensor="sun", seed=2, units=10),
-        "sun-time": measured(
-            "cubesense", _sensor, 100, 3, 10, sensor="sun", sun_angle=5, seed=2, units=10
-        ),
+        "nadir-time": Trial(partial(_times, sensor="nadir"), 90, 6, 15),
+        "sun-time": Trial(partial(_times, sensor="sun", sun_angle=5), 90, 6, 10),
         "sun-still": Trial(partial(_scatter, sensor="sun", angles_deg=(0.0, 40.0, 80.0)), 60, 6, 8),
         "power": Trial(_power, profiles=False),
         "lens": Trial(_lens, profiles=False),

@@ -1,10 +1,12 @@
 import re
+from collections import Counter
 from dataclasses import replace
 
 import pytest
 
 from cubestack.firmware_model.mcu import pic18
 from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533, CORE_HZ, blackfin_bf533
+from cubestack.firmware_model.mcu.compiled import compiled_costs
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3, cortex_m3
 from cubestack.firmware_model.mcu.costs import Cost, CostError, CostTable, Meter
 from cubestack.firmware_model.mcu.memory import FlashStore
@@ -12,6 +14,7 @@ from cubestack.firmware_model.mcu.memory import FlashStore
 from ..operations import as_on_record
 
 TABLES = [CORTEX_M3, BLACKFIN_BF533, pic18.PIC18F45K20]
+COMPILED = pic18.pic18f45k20(library="compiled")
 
 SIMPLE = CostTable(
     "simple part",
@@ -167,22 +170,54 @@ def test_blackfin_costs_include_every_float_operation_of_the_cortex_m3() -> None
 # --- PIC18 ----------------------------------------------------------------------------------------
 
 
-def test_pic18_costs_are_not_fitted() -> None:
-    assert not [n for n, c in pic18.PIC18F45K20.operations.items() if c.provenance == "fitted"]
+@pytest.mark.parametrize("table", [pic18.PIC18F45K20, COMPILED], ids=["notes", "compiled"])
+def test_pic18_costs_are_not_fitted_and_at_most_a_third_is_assumed(table: CostTable) -> None:
+    tags = Counter(cost.provenance for cost in table.operations.values())
+    assert tags["fitted"] == 0
+    assert 3 * tags["assumed"] <= tags.total()
 
 
-def test_float_operation_costs_rise_from_convert_to_atan2() -> None:
-    cycles = {name: cost.cycles for name, cost in pic18.PIC18F45K20.operations.items()}
+@pytest.mark.parametrize("table", [pic18.PIC18F45K20, COMPILED], ids=["notes", "compiled"])
+def test_float_operation_costs_rise_from_convert_to_atan2(table: CostTable) -> None:
     order = ["convert", "mul", "div", "sqrt", "atan2"]
-    assert [cycles[f"f32_{name}"] for name in order] == sorted(
-        cycles[f"f32_{name}"] for name in order
+    assert [table.cycles[f"f32_{name}"] for name in order] == sorted(
+        table.cycles[f"f32_{name}"] for name in order
     )
-    assert cycles["strobe_byte"] < cycles["scan_byte"]
+    assert table.cycles["strobe_byte"] < table.cycles["scan_byte"] < table.cycles["address_byte"]
 
 
-def test_pic18_clock_follows_the_published_timer_formula() -> None:
-    # 4 tenths of the timer's period at the prescaler of 256, CubeSense thesis, equation 7.4.1
+def test_notes_are_faster_than_the_compiled_library_and_share_the_rest() -> None:
+    notes = pic18.PIC18F45K20
+    assert notes.operations.keys() == COMPILED.operations.keys()
+    for name, cost in notes.operations.items():
+        if name in pic18.notes_costs():
+            assert cost.cycles < COMPILED.cycles[name], name
+        else:
+            assert cost == COMPILED.operations[name]
+
+
+def test_compiled_costs_are_whole_cycles_of_the_data_file_with_its_source() -> None:
+    found = compiled_costs("pic18")
+    cost = COMPILED.operations["f32_mul"]
+    assert abs(cost.cycles - found.operations["f32_mul"]) <= 0.5
+    assert cost.source == "sdcc 4.2.0 #13081 (Linux) on gpsim 0.31.0, p18f26k22"
+    assert replace(found, operations={"f32_mul": 0.2}).cost("f32_mul").cycles == 1
+
+
+def test_pic18_clock_is_the_published_timer_formulas() -> None:
+    # The timer's period at the prescaler of 256, CubeSense thesis, equation 7.4.1.
     assert pic18.PIC18F45K20.seconds(256 * 1000) == pytest.approx(1000 * 256 / 5e6)
+    literal = pic18.pic18f45k20(clock="oscillator")
+    assert literal.seconds(1000) == 4 * pic18.PIC18F45K20.seconds(1000)
+    assert literal.operations == pic18.PIC18F45K20.operations
+
+
+@pytest.mark.parametrize("wrong", [{"library": "mine"}, {"clock": "atomic"}])
+def test_pic18_rejects_unknown_libraries_and_clocks(wrong: dict[str, str]) -> None:
+    with pytest.raises(
+        ValueError, match=r"costs are notes or compiled and the clock instruct.*not"
+    ):
+        pic18.pic18f45k20(**wrong)
 
 
 def test_flash_pages_keep_the_last_data_and_count_writes() -> None:
