@@ -82,7 +82,8 @@ SPEEDS = {
 
 def _times(opened: CubeSenseOpener, frames: int, **options: Any) -> Figures:
     """Time of a measurement, and its sigma, at each of ``SPEEDS``."""
-    figures, each = {}, max(2, frames // len(SPEEDS))
+    figures: dict[str, float] = {}
+    each = max(2, frames // len(SPEEDS))
     for name, speed in SPEEDS.items():
         board = {**opened.board, "set": ",".join(filter(None, (opened.board.get("set"), speed)))}
         found = _sensor(list(measure("cubesense", frames=each, seed=2, **board, **options)))  # type: ignore[arg-type]
