@@ -201,7 +201,7 @@ def test_each_format_describes_each_switch(name: str, run: Run) -> None:
     assert list(listed) == list(declared)
     text = " ".join(run("registers", name, "--switches").out.split())
     for one, switch in declared.items():
-        assert [listed[one][profile] for profile in PROFILES] == list(switch.choices[:2])
+        assert [listed[one][each] for each in PROFILES] == [switch.published, switch.extended]
         assert listed[one]["source"] == switch.source
         for part in (one, switch.meaning, switch.source, switch.reason, *switch.choices):
             assert part in text

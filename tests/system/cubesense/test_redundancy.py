@@ -111,6 +111,6 @@ def test_single_search_gateware_gives_the_same_direction(ready: Open, camera: Ca
             assert (own == before).all(), "nothing is written into the memory of the sender"
     one, usual = found["one-search"], found["corrected"]
     assert (one.alpha_deg, one.beta_deg) == (usual.alpha_deg, usual.beta_deg)
-    expected_s = {Camera.SUN: 0.87, Camera.NADIR: 13.93}[camera]
+    expected_s = {Camera.SUN: 0.8, Camera.NADIR: 11.38}[camera]
     assert took_s["one-search"] == pytest.approx(expected_s, abs=0.4)
     assert took_s["corrected"] < 0.3
