@@ -12,6 +12,7 @@ from math import atan, cos, hypot, pi, radians, tan
 import numpy as np
 
 from cubestack.firmware_model.aramis.arrays import Floats, Mask
+from cubestack.firmware_model.attitude.lens_doubt import UNIT_PX, LensErrors
 from cubestack.firmware_model.interface.cameras.mt9m001 import COLUMNS, PIXEL_PITCH_MM, ROWS
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.values import DeclaredValues, flag, number, whole
@@ -31,6 +32,14 @@ class CameraField(DeclaredValues):
     pitch_x_mm: float = number(PIXEL_PITCH_MM, "distance of pixel centres in a row", 1e-4, 1)
     pitch_y_mm: float = number(PIXEL_PITCH_MM, "distance of pixel centres in a column", 1e-4, 1)
     round: bool = flag(True, "only the circle across the shorter side is used")
+    focal_tolerance: float = number(0.6, "standard deviation of the focal length", 0, 20, "percent")
+    shape_tolerance: float = number(
+        0.1, "of the ratio of fx to fy, and of the skew", 0, 20, "percent"
+    )
+    point_tolerance: float = number(3.0, "of the principal point in each axis", 0, 200, "px")
+    distortion_tolerance: float = number(
+        5.0, "of the distortion, of which nothing is described, at 512 px", 0, 200, "px"
+    )
 
     @property
     def radius_mm(self) -> float:
@@ -44,6 +53,19 @@ class CameraField(DeclaredValues):
     def centre(self) -> tuple[float, float]:
         """Column and row of the boresight, px."""
         return (self.columns - 1) / 2, (self.rows - 1) / 2
+
+    @property
+    def tolerance(self) -> LensErrors:
+        """What a calibration leaves open. A lens' parts are centred to a fifth of a pixel for each
+        pixel of radial distortion (assumed)."""
+        percent = UNIT_PX / 100
+        return LensErrors(
+            self.focal_tolerance * percent,
+            self.shape_tolerance * percent,
+            self.point_tolerance,
+            self.distortion_tolerance,
+            self.distortion_tolerance / 5,
+        )
 
     @property
     def scale(self) -> tuple[float, float]:

@@ -76,9 +76,7 @@ class Profile(DeclaredValues):
         0,
         1000,
     )
-    lens_doubt: float = number(
-        0.0, "probability that the lens is not as described, before the picture", 0, 1
-    )
+    judge_lens: bool = flag(True, "stars beside their places judge the lens")
     motion_sigma_rad: float = number(7e-4, "uncertainty that is too much then", 0, 0.1)
 
 

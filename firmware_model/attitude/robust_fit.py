@@ -27,7 +27,7 @@ TAILS = 5.0  #: degrees of freedom of the errors' distribution: a star at 3 sigm
 
 ROUNDS = 4
 SIGNIFICANT = 4.0  #: sigmas that the focal length must be off before it is corrected
-_HALF_CHI2 = 0.693  #: median of half the squared length of an error in two axes of sigma 1
+HALF_CHI2 = 0.693  #: median of half the squared length of an error in two axes of sigma 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +75,7 @@ def robust_fit(
             if number == 0:
                 continue  # before stars are blamed for what the focal length does
         relative = squares / (believed * believed)
-        spread = max(1.0, float(np.median(relative)) / 2 / _HALF_CHI2)
+        spread = max(1.0, float(np.median(relative)) / 2 / HALF_CHI2)
         trust = np.minimum((TAILS + 2) / (TAILS + relative / np.float32(spread)), 1)
         trusted = np.asarray(believed / np.sqrt(trust), np.float32)
         meter.charge(

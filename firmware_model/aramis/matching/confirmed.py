@@ -131,9 +131,10 @@ def _solution(
             sigmas,
             lambda pixels: field.directions(pixels, meter),
             field.centre,
+            field.scale[1],
             fit,
             meter,
-            profile.lens_doubt,
+            field.tolerance if profile.judge_lens else None,
         )
         if lens.is_refused:
             return unsolved(Reason.LENS, measured, expected=expected)

@@ -20,7 +20,7 @@ from cubestack.firmware_model.attitude.geometry import (
     undistort,
     unit_vectors,
 )
-from cubestack.firmware_model.attitude.lens_doubt import judge_lens
+from cubestack.firmware_model.attitude.lens_doubt import LensErrors, judge_lens
 from cubestack.firmware_model.attitude.quest import quest
 from cubestack.firmware_model.attitude.robust_fit import robust_fit
 from cubestack.firmware_model.cubestar.detection.contract import Detection
@@ -43,10 +43,10 @@ SCALED = 2e-3
 #: lens residuals, defocus, uneven response and hot pixels, which move neighbouring stars alike.
 EXCESS = 2.2
 
-
-#: Probability that the lens is not as described. 0: it is believed. With more, a tracker whose lens
-#: is known to the uncertainties of a calibration refuses whole nights (docs/identification.md).
-LENS_DOUBT = 0.0
+#: What the calibration leaves open: of the principal point, a third of the 13 and 15 px of figure
+#: 5.12, which prints three standard deviations. It does not say in which direction its coefficients
+#: map; with the other one, distortion of both orders differs by several px.
+TOLERANCE = LensErrors(focal=0.7, shape=0.3, point=4.8, radial=4.0, tangential=0.5)
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,9 +92,10 @@ def by_errors(
             sigmas,
             lambda pixels: unit_vectors(undistort(pixels, camera, meter), camera, meter),
             (camera.cx, camera.cy),
+            camera.pitch_mm / camera.focal_length_mm,
             fit,
             meter,
-            LENS_DOUBT,
+            TOLERANCE,
         )
         refused = lens.is_refused
         fit = replace(fit, quaternion=lens.quaternion, covariance=lens.covariance)

@@ -16,7 +16,6 @@ from cubestack.firmware_model.aramis.matching.identification import identify
 from cubestack.firmware_model.aramis.matching.shutter import FEWEST, at_middle_row
 from cubestack.firmware_model.aramis.pipeline import VERIFIED
 from cubestack.firmware_model.aramis.solution import Profile, Solution, StarList
-from cubestack.firmware_model.attitude.lens_doubt import DOUBT
 from cubestack.firmware_model.attitude.quest import AttitudeError
 from cubestack.firmware_model.interface.aramis import MeasurementOutcome, Reason
 
@@ -35,8 +34,8 @@ def found(
 
 @pytest.mark.parametrize("noise_px", [0.05, 0.2, 0.5])
 def test_confirmed_attitude_errors_match_the_reported_sigma(noise_px: float) -> None:
-    """Without doubt about the lens, which would add an error that an exact lens does not have."""
-    inside, sure = [], replace(PROFILE, lens_doubt=0.0)
+    """Without the lens' tolerance, an error that an exact lens does not have."""
+    inside, sure = [], replace(PROFILE, judge_lens=False)
     for made in pictures(60, 7, Light(noise_px=noise_px)):
         solution = found(made, noise_px=noise_px, profile=sure)
         if solution.quaternion is None:
@@ -48,10 +47,10 @@ def test_confirmed_attitude_errors_match_the_reported_sigma(noise_px: float) -> 
     assert 0.55 < np.mean(inside) < 0.85
 
 
-def test_doubt_about_the_lens_widens_the_reported_sigma() -> None:
+def test_tolerance_of_the_lens_widens_the_reported_sigma() -> None:
     for made in pictures(5, 7):
-        sure = found(made).rating
-        doubting = found(made, profile=replace(PROFILE, lens_doubt=DOUBT)).rating
+        sure = found(made, profile=replace(PROFILE, judge_lens=False)).rating
+        doubting = found(made).rating
         assert sure is not None
         assert doubting is not None
         assert np.all(doubting.sigma_rad[:2] > sure.sigma_rad[:2])
