@@ -21,7 +21,7 @@ Floats = NDArray[np.float32]
 Reals = NDArray[np.float64]
 
 FOCAL_PX, MIDDLE = 1000.0, np.array([511.5, 255.5])
-NARROW = 8.0  #: a lens of so many times the focal length
+NARROW = 8.0  #: factor of the focal length
 NOISE_PX = 0.03
 METER = Meter(CORTEX_M3)
 TOLERANCE = LensErrors(focal=0.7, shape=0.3, point=5.0, radial=3.0, tangential=0.5)
