@@ -30,6 +30,7 @@ class Site(Enum):
     CAMERA = "camera"
     MEMORY = "memory"
     FPGA = "FPGA"
+    WHOLE_FPGA = "FPGA that can fail alone"
     SUPPLY = "supply channel"
     PROCESSOR = "processor"
     CORE = "core of a processor with own firmware"

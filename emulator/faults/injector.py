@@ -234,6 +234,7 @@ class Faults:
         """Mechanism of all pins of the FPGA: the processor has only one FPGA port."""
         assert self._sites.engine is not None
         self._sites.processor.fpga = pins = PinFaults(
-            self._env, self.report, self._sites.engine, self._sites.engine.wiring.data
+            *(self._env, self.report, self._sites.engine, self._sites.engine.wiring.data),
+            self._sites.fpgas,
         )
         return pins

@@ -1,17 +1,18 @@
-"""Faults between processor and FPGA: wrong acknowledges, and glitches on control pins.
+"""Faults between processor and FPGA: wrong acknowledges, glitches on control pins, a dead FPGA.
 
 The mechanism replaces the processor's FPGA port, and forwards everything else.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from fractions import Fraction
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.emulator.faults.injection import Injection, Mechanism, Report, active
-from cubestack.emulator.faults.table import AckLate, AckLost, AckStuck, ControlGlitch
+from cubestack.emulator.faults.table import AckLate, AckLost, AckStuck, ControlGlitch, FpgaDead
 from cubestack.emulator.sim.fpga_port import Driver, FpgaPort, Transactions
 from cubestack.emulator.sim.virtual_time import PS_PER_US, Kernel
 
@@ -25,11 +26,20 @@ class PinFaults(Mechanism, FpgaPort):
         around_reads: called before and after bytes are read from the FPGA.
     """
 
-    def __init__(self, env: Kernel, report: Report, engine: FpgaPort, data: str = "") -> None:
-        """Replaces ``engine``; ``data`` are the pins for reading single bytes."""
+    def __init__(
+        self,
+        env: Kernel,
+        report: Report,
+        engine: FpgaPort,
+        data: str = "",
+        fpgas: Mapping[str, tuple[str, int]] = MappingProxyType({}),
+    ) -> None:
+        """Replaces ``engine``; ``data`` are the pins for reading single bytes, ``fpgas`` as in
+        ``Sites``."""
         super().__init__(env, report)
-        self._engine, self._data = engine, data
+        self._engine, self._data, self._fpgas = engine, data, fpgas
         self._forced: dict[str, int] = {}
+        self._held: dict[str, int] = {}  #: levels that a dead FPGA's pins keep
         self._driven: dict[str, int] = {}
         self._rose_ps: dict[str, int] = {}
         self.around_reads: list[Callable[[], None]] = []
@@ -39,8 +49,31 @@ class PinFaults(Mechanism, FpgaPort):
             self.env.process(self._glitch(injection, injection.fault))
             return
         self.injections.append(injection)
+        if isinstance(injection.fault, FpgaDead):
+            pin, level = self._fpgas[injection.target]
+            self._held[pin] = level
+            self._force(pin)
+            self.report(self.env.now, injection, f"does nothing, as with {pin} at {level}")
+            return
         level = self._engine.get_pin(injection.target)
         self.report(self.env.now, injection, f"begins with the pin at {level}")
+
+    def end(self, injection: Injection) -> None:
+        super().end(injection)
+        if isinstance(injection.fault, FpgaDead) and not any(
+            injection.target == other.target
+            for other, _ in active(self.injections, FpgaDead, self.env.now)
+        ):
+            pin, _ = self._fpgas[injection.target]
+            self._held.pop(pin, None)
+            self._force(pin)
+
+    def _force(self, pin: str) -> None:
+        """Drive the level that a fault, or else the processor, wants."""
+        self._engine.run(max(self.env.now, self._engine.now_ps))
+        self._driven.setdefault(pin, self._engine.get_pin(pin))
+        level = self._held.get(pin, self._forced.get(pin, self._driven[pin]))
+        self._engine.set_pin(pin, level)
 
     # --- FpgaPort -------------------------------------------------------------------------------
 
@@ -55,7 +88,7 @@ class PinFaults(Mechanism, FpgaPort):
     @property
     def driver(self) -> Driver | None:
         """None while a fault needs every access."""
-        needed = self.injections or self._forced or self.around_reads
+        needed = self.injections or self._forced or self._held or self.around_reads
         return None if needed else self._engine.driver
 
     def attend(self, reached_ps: int, end: int, camera: int, until_ps: int) -> int:
@@ -64,7 +97,7 @@ class PinFaults(Mechanism, FpgaPort):
     def set_pin(self, name: str, value: int) -> None:
         """Drive a pin; during a glitch, the level takes effect after it."""
         self._driven[name] = value
-        if name not in self._forced:
+        if name not in self._forced and name not in self._held:
             self._engine.set_pin(name, value)
 
     def get_pin(self, name: str) -> int:
@@ -142,15 +175,13 @@ class PinFaults(Mechanism, FpgaPort):
     def _glitch(self, injection: Injection, fault: ControlGlitch) -> Any:
         pin = injection.target
         if pin not in self._forced:
-            self._engine.run(max(self.env.now, self._engine.now_ps))
-            self._driven[pin] = self._engine.get_pin(pin)
+            self._driven.setdefault(pin, self._engine.get_pin(pin))
             self._forced[pin] = 1 - self._driven[pin]
-            self._engine.set_pin(pin, self._forced[pin])
+            self._force(pin)
             self.report(self._engine.now_ps, injection, f"goes to {self._forced[pin]}")
             yield self.env.timeout(round(fault.width_ns * PS_PER_NS))
-            self._engine.run(max(self.env.now, self._engine.now_ps))
             del self._forced[pin]
-            self._engine.set_pin(pin, self._driven[pin])
+            self._force(pin)
 
 
 def _delay_ps(fault: AckLate) -> int:

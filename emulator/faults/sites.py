@@ -47,6 +47,8 @@ class Sites:
     supplies: PowerModel
     engine: RtlEngine | None = None
     controls: tuple[str, ...] = ()  # pins that command the FPGAs
+    # each of several FPGAs by its name: a control pin, and the level at which it does nothing
+    fpgas: Mapping[str, tuple[str, int]] = field(default_factory=dict)
     cameras: Mapping[str, CameraSite] = field(default_factory=dict)  # by their names at the engine
     resets: Mapping[str, Callable[[], None]] = field(default_factory=dict)  # by their causes
     memories: Mapping[str, NDArray[np.uint8]] = field(default_factory=dict)  # not the FPGAs'
@@ -62,6 +64,7 @@ class Sites:
             Site.SUPPLY: self.supplies.table.channels,
             Site.CAMERA: self.cameras,
             Site.CONTROL: self.controls,
+            Site.WHOLE_FPGA: self.fpgas,
             Site.PROCESSOR: self.resets,
             Site.MEMORY: self.all_memories(),
             Site.CORE: () if self.core is None else ("core",),

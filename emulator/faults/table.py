@@ -201,6 +201,11 @@ class RegisterUpsets(Fault, kind="register-upsets", site=Site.FPGA):
 
 
 @dataclass(frozen=True)
+class FpgaDead(Fault, kind="fpga-dead", site=Site.WHOLE_FPGA):
+    """One of several FPGAs does nothing, whatever the processor commands; it drives no pin."""
+
+
+@dataclass(frozen=True)
 class LatchUp(Fault, kind="latch-up", site=Site.SUPPLY, momentary=True):
     """A supply channel draws a higher current until it is switched off."""
 

@@ -1,8 +1,8 @@
 """Nadir scan: the addresses of every 64th row, then of every 64th column.
 
 CubeSense thesis, section 6.5.1 and figure 6.7: the k-th clock of a line presents its k-th pixel.
-As flown (appendix D.3) the address has a register after its counters, which start at column 1, and
-every pixel is one clock early; the program for that gateware (appendix C.3) adds 1 to positions.
+As printed (appendix D.3) the address has a register after its counters, which start at column 1,
+and every pixel is one clock early; the program for it (appendix C.3) adds 1 to positions.
 """
 
 from amaranth.hdl import Cat, Const, Module, Mux, Signal
@@ -18,7 +18,7 @@ class NadirScan(Component):
     In reset, and in the two states that preset (the default state and B), the address is 0; the
     clock that leaves such a state presents the byte there, which belongs to no line. States A
     (rows) and C (columns) address the pixel that the next clock presents. C repeats after its last
-    pixel. As flown, state B does not change the address, and C runs on beyond the image.
+    pixel. As printed, state B does not change the address, and C runs on beyond the image.
 
     Ports:
         address: row : column.
@@ -31,13 +31,13 @@ class NadirScan(Component):
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
-        if self._read_out.as_flown:
-            self._as_flown(m)
+        if self._read_out.as_printed:
+            self._as_printed(m)
         else:
             self._exact(m)
         return m
 
-    def _as_flown(self, m: Module) -> None:
+    def _as_printed(self, m: Module) -> None:
         """A column counter, a row counter and the address register after them."""
         sync = m.d[self._domain]
         size = self._read_out

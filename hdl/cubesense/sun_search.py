@@ -1,7 +1,7 @@
 """Finds the first Sun pixel while the image is being stored.
 
 CubeSense thesis, section 6.6.1 and figure 6.15. A single bright pixel may be damaged, so the first
-of three adjacent bright pixels counts. The search as flown (appendix D.4) also counts across the
+of three adjacent bright pixels counts. The search as printed (appendix D.4) also counts across the
 end of a line; the corrected one does not, because pixels there are not adjacent.
 """
 
@@ -19,7 +19,7 @@ class SunSearch(Component):
     and those of the first Sun pixel once the third bright pixel is written. The rest of the same
     frame is ignored.
 
-    As flown there is no "not found": the first pixel of every run is noted at once, whatever
+    As printed there is no "not found": the first pixel of every run is noted at once, whatever
     follows, and an image without a bright pixel leaves the coordinates unchanged. ``start`` is
     ignored; only reset begins a new search.
 
@@ -33,7 +33,7 @@ class SunSearch(Component):
 
     def __init__(self, read_out: ReadOut, *, domain: str = "pix") -> None:
         self._column_bits = read_out.column_bits
-        self._as_flown = read_out.as_flown
+        self._as_printed = read_out.as_printed
         self._domain = domain
         written = {"store": In(1), "pixel": In(8), "address": In(read_out.address_bits)}
         sun = {"x": Out(read_out.column_bits), "y": Out(read_out.row_bits)}
@@ -47,7 +47,7 @@ class SunSearch(Component):
         y = Signal.like(self.y, reset_less=True)
         m.d.comb += [self.x.eq(x), self.y.eq(y)]
 
-        if self._as_flown:
+        if self._as_printed:
             column, row = self.address[: self._column_bits], self.address[self._column_bits :]
             count = Signal(range(SUN_RUN + 1))
             bright_now = self.pixel >= SUN_THRESHOLD

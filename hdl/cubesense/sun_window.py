@@ -1,7 +1,7 @@
 """Sun window: the first Sun pixel's coordinates, then the square of pixels around the Sun.
 
 CubeSense thesis, section 6.6.2 and figure 6.16. At the image border the whole window moves inside
-the image; as flown (appendix D.4) it wraps over the ends of the address.
+the image; as printed (appendix D.4) it wraps over the ends of the address.
 """
 
 from amaranth.hdl import Cat, Module, Mux, Signal, Value
@@ -43,7 +43,7 @@ class SunWindow(Component):
             self.coordinate.eq(~in_window),
             self.byte.eq(Mux(state[0], pair[8:], pair[:8])),
         ]
-        if self._read_out.as_flown:
+        if self._read_out.as_printed:
             self._wrap_window(m, in_window)
         else:
             self._move_window_inside(m, in_window)

@@ -21,12 +21,12 @@ LINK_CLOCK = Clock("LINK_C[0]", 74, "the other camera's PCLK, over the link")
 _CLK = Clock(CLK, 400, "two instructions of the microcontroller at 5 MHz")
 
 _OPTION = ", the microcontroller sets the address"
-_AS_FLOWN = READ_OUTS["as-flown"]
-_VARIANTS = {name: READ_OUTS[name] for name in ("as-flown", "one-search")}
+_AS_PRINTED = READ_OUTS["both-searches"]
+_VARIANTS = {name: READ_OUTS[name] for name in ("both-searches", "one-search")}
 
 
 def _title(mcu_addressing: bool, read_out: ReadOut) -> str:
-    variant = ", as flown" * read_out.as_flown + ", with one search" * read_out.one_search
+    variant = ", as printed" * read_out.as_printed + ", with one search" * read_out.one_search
     return _OPTION * mcu_addressing + variant
 
 
@@ -36,7 +36,7 @@ def _fpga(side: Side, mcu_addressing: bool = False, read_out: ReadOut = FULL_SIZ
         f"CubeSense, {side} sensor's FPGA{_title(mcu_addressing, read_out)}",
         (PIXEL_CLOCK, LINK_CLOCK, _CLK),
         pulled_up=("LINK_C",),
-        fits=not read_out.as_flown or read_out.one_search,
+        fits=not read_out.as_printed or read_out.one_search,
     )
 
 
@@ -72,8 +72,8 @@ TOPS: TopTable = {
     "frame writer 640 x 480": Block(partial(FrameWriter, 640, 480)),
     "frame gap of 858 clocks": Block(partial(FrameGap, 858)),
     **{
-        f"{name}{', as flown' * size.as_flown}": Block(partial(make, size))
-        for size in (FULL_SIZE, _AS_FLOWN)
+        f"{name}{', as printed' * size.as_printed}": Block(partial(make, size))
+        for size in (FULL_SIZE, _AS_PRINTED)
         for name, make in _EDGE_BLOCKS.items()
     },
     "CubeSense reader": Block(partial(CubeSenseReader, FULL_SIZE)),

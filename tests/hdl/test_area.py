@@ -181,7 +181,7 @@ DOCUMENTED = {
     'CubeSenseFpga("nadir", mcu_addressing=True)': "cubesense-nadir-addressing",
     **{
         f'CubeSenseFpga("{side}", READ_OUTS["{gateware}"])': f"cubesense-{side}-{gateware}"
-        for gateware in ("as-flown", "one-search")
+        for gateware in ("both-searches", "one-search")
         for side in ("sun", "nadir")
     },
     "MatrixCounter(640, 480)": "matrix counter 640 x 480",

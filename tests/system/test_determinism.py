@@ -96,7 +96,7 @@ def exported_pair(tmp_path_factory: pytest.TempPathFactory) -> str:
     """Both shipped FPGAs of CubeSense, as another tool rewrites them."""
     folder, tops = tmp_path_factory.mktemp("pair"), tops_in(PAIR_TOPS)
     for side in ("sun", "nadir"):
-        text = verilog_file(side, tops[f"cubesense-{side}-as-flown"])
+        text = verilog_file(side, tops[f"cubesense-{side}-both-searches"])
         (folder / f"{side}.v").write_text(text)
         script = f"read_verilog {side}.v\nhierarchy -auto-top\nproc\nflatten\ntribuf\nopt -full\n"
         run_yosys(f"{script}write_verilog -noattr {side}_rewritten.v\n", folder)

@@ -193,6 +193,7 @@ class CubeSenseBoard(Board):
         return replace(
             super().sites(),
             controls=(pins.RNW, pins.EDGE, pins.SHIFT, *ENABLE),
+            fpgas={half: (ENABLE[camera], 1) for camera, half in HALVES.items()},
             cameras={
                 half: CameraSite(self.cameras[camera], self.cameras[camera].power, f"{half}_camera")
                 for camera, half in HALVES.items()

@@ -21,7 +21,7 @@ inside than a bright one.
 
 Appendix C.3 has two slips that the text does not have, reproduced with ``listing``: edges of the
 last 32 rows come out 224 rows too high, and the rim has a separate centre. The 1 that it adds to
-positions is right for gateware as flown (appendix D.3), which presents each pixel one clock early
+positions is right for gateware as printed (appendix D.3), which presents each pixel one clock early
 (``ReadOut.scan_start``); samples are one pixel further there.
 """
 

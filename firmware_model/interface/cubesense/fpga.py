@@ -2,7 +2,7 @@
 
 CubeSense thesis, tables 6.3 and 6.4 (commands), section 6.4.4 (address), section 6.5.1 and figure
 6.7 (nadir scan), section 6.6 and figures 6.15 and 6.16 (Sun search and window), section 9.2.2
-(address control from the microcontroller), appendices D.3 and D.4 (gateware as flown).
+(address control from the microcontroller), appendices D.3 and D.4 (gateware as printed).
 """
 
 from collections.abc import Iterator
@@ -152,7 +152,7 @@ class ReadOut:
     window_above: int = 3
     #: as printed in appendices D.3 and D.4: the scan presents each pixel one clock earlier, and the
     #: window crosses the image border
-    as_flown: bool = False
+    as_printed: bool = False
     #: each FPGA has only its own sensor's search. On commands for the other sensor's edge data, the
     #: owner of the memory sends the whole image, as table 6.4 words it, and the FPGA of the camera,
     #: not of the memory, searches for the first Sun pixel.
@@ -211,18 +211,18 @@ class ReadOut:
     @property
     def scan_start(self) -> int:
         """Position on its line of the first pixel after a preset."""
-        return int(self.as_flown)
+        return int(self.as_printed)
 
     def scan(self) -> Iterator[tuple[int, int] | None]:
         """Pixel (x, y) that each clock of the nadir scan presents; None for a preset.
 
-        As flown the second preset presents the first column's first pixel, each line ends with the
-        next line's first pixel, the last row repeats its last pixel, and the last column ends with
-        a pixel beyond the image.
+        As printed the second preset presents the first column's first pixel, each line ends with
+        the next line's first pixel, the last row repeats its last pixel, and the last column ends
+        with a pixel beyond the image.
         """
         rows = [(x, y) for y in self.scan_rows for x in range(self.columns)]
         columns = [(x, y) for x in self.scan_columns for y in range(self.rows)]
-        if self.as_flown:
+        if self.as_printed:
             beyond = (self.scan_columns[-1] + self.scan_step) % (1 << self.column_bits)
             yield from (None, *rows[1:], rows[-1], *columns, (beyond, 0))
         else:
@@ -231,9 +231,9 @@ class ReadOut:
     def window_origin(self, x: int, y: int) -> tuple[int, int]:
         """First pixel of the window around the first Sun pixel (x, y).
 
-        It is inside the image; as flown it can be outside, with negative coordinates too.
+        It is inside the image; as printed it can be outside, with negative coordinates too.
         """
-        if self.as_flown:
+        if self.as_printed:
             return x - self.window_left, y - self.window_above
         return (
             min(max(x - self.window_left, 0), self.columns - self.window),
@@ -246,9 +246,9 @@ FULL_SIZE = ReadOut()
 
 #: Read-outs by the value of switch ``gateware``.
 READ_OUTS = {
-    "as-flown": replace(FULL_SIZE, as_flown=True),
+    "both-searches": replace(FULL_SIZE, as_printed=True),
     "corrected": FULL_SIZE,
-    "one-search": replace(FULL_SIZE, as_flown=True, one_search=True),
+    "one-search": replace(FULL_SIZE, as_printed=True, one_search=True),
 }
 
 

@@ -8,7 +8,7 @@ from cubestack.hdl.contract.contract import Size
 FULL_IMAGE = Size(FULL_SIZE.columns, FULL_SIZE.rows)
 
 #: The fields of :class:`ReadOut` that a design may have as parameters, in capitals.
-_PARAMETERS = asdict(FULL_SIZE).keys() - {"as_flown", "one_search"}
+_PARAMETERS = asdict(FULL_SIZE).keys() - {"as_printed", "one_search"}
 
 
 def read_out(size: Size) -> ReadOut:

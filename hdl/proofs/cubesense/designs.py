@@ -27,7 +27,7 @@ def proof_design(
 
     def make(small: bool) -> tuple[Component, ReadOut]:
         known = READ_OUTS[gateware]
-        options = {"as_flown": known.as_flown, "one_search": known.one_search}
+        options = {"as_printed": known.as_printed, "one_search": known.one_search}
         size = replace(SMALL if small else FULL_SIZE, **options)
         return design(size), size
 

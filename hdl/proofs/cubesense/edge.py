@@ -159,7 +159,7 @@ def _first_sun_pixel(side: Side, m: Module, d: SimpleNamespace) -> None:
     ]
 
 
-# As flown: the behaviour of the listing in appendix D.4.
+# As printed: the behaviour of the listing in appendix D.4.
 
 
 def _keeps_coordinates(m: Module, d: SimpleNamespace) -> None:
@@ -211,9 +211,9 @@ def _sends_only(m: Module, d: SimpleNamespace) -> None:
     m.d.comb += Assert(~sending | (d.SRAM_CE_N & d.SRAM_WE_N & ~d.SRAM_D_OE & ~d.ACK))
 
 
-def as_flown_proofs() -> dict[str, Proof]:
+def as_printed_proofs() -> dict[str, Proof]:
     """Proofs of the sun's FPGA; the nadir's differs only in the side of its camera."""
-    make = fpga("sun", gateware="as-flown")
+    make = fpga("sun", gateware="both-searches")
     at = {"at_column": "reader.window.column", "at_row": "reader.window.row"}
     window = {"window": "reader.window", "x": "reader.sun_x", "y": "reader.sun_y"}
     return {
@@ -223,16 +223,16 @@ def as_flown_proofs() -> dict[str, Proof]:
             _sends_only,
             StuckWire("dataflow.store", 1),
         ),
-        "sun-keeps-coordinates-as-flown": Proof(
-            "As flown the coordinates stay until a bright pixel is written",
+        "sun-keeps-coordinates-as-printed": Proof(
+            "As printed the coordinates stay until a bright pixel is written",
             make,
             _keeps_coordinates,
             StuckWire("search.store", 1),
             writer_wires("writer", "pix", below="pix_writer")
             | wires_below("search", "x", "y", "pixel"),
         ),
-        "sun-window-as-flown": Proof(
-            "As flown the Sun window wraps over the ends of the address",
+        "sun-window-as-printed": Proof(
+            "As printed the Sun window wraps over the ends of the address",
             make,
             _wraps,
             StuckWire("reader.window.next_column", 3),

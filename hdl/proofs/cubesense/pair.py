@@ -14,7 +14,7 @@ from cubestack.hdl.cubesense.pair import CubeSensePair
 from cubestack.hdl.proofs import properties
 from cubestack.hdl.proofs.cubesense import pins
 from cubestack.hdl.proofs.cubesense.designs import column_row, fpga, proof_design
-from cubestack.hdl.proofs.cubesense.edge import as_flown_proofs, edge_proofs
+from cubestack.hdl.proofs.cubesense.edge import as_printed_proofs, edge_proofs
 from cubestack.hdl.proofs.properties import AUXILIARY, starts_in, wires_below, writer_wires
 from cubestack.hdl.proofs.prover import Proof, StuckWire
 
@@ -185,10 +185,10 @@ PROOFS = {
         StuckWire("nadir.dataflow.pass_edge", 1),
         _DRIVERS,
     ),
-    **as_flown_proofs(),
-    "sun-idle-as-flown": Proof(
+    **as_printed_proofs(),
+    "sun-idle-as-printed": Proof(
         "With EN high every register but the Sun's coordinates and the window's address is reset",
-        fpga("sun", gateware="as-flown"),
+        fpga("sun", gateware="both-searches"),
         partial(_idle, further=("reader.window.shown",)),
         StuckWire("pix_writer.pix_rst", 0),
     ),

@@ -179,9 +179,9 @@ def _lens(_opened: CubeSenseOpener, _frames: int) -> Figures:
 
 
 def _tiles(opened: CubeSenseOpener, _frames: int) -> Figures:
-    """Stored estimates of tiles: both FPGAs as built and with one search, and counters."""
+    """Stored estimates of tiles: FPGAs with both searches and with one, and counters."""
     designs = recorded_areas(AREA_FILE)
-    flown = "-as-flown" * (opened.board["profile"] == "published")
+    flown = "-both-searches" * (opened.board["profile"] == "published")
     names = {
         **{side: f"cubesense-{side}{flown}" for side in ("sun", "nadir")},
         **{f"{side}_one": f"cubesense-{side}-one-search" for side in ("sun", "nadir")},

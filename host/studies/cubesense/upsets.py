@@ -84,7 +84,7 @@ class CubeSenseUpsetOptions(GatewareUpsetOptions):
 
     gateware: str = text(
         DEFAULT_SWITCHES.gateware,
-        f"shipped variant of both FPGAs ({', '.join(VARIANTS)}; default as-flown), or your own "
+        f"shipped variant of both FPGAs ({', '.join(VARIANTS)}; default one-search), or your own "
         "design of the pair, or of one FPGA: sun=..., nadir=... (docs/how-to/own-gateware.md)",
         metavar="VARIANT|FILE[:TOP]|MODULE:CLASS",
     )

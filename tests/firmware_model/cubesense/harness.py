@@ -93,7 +93,7 @@ class Harness(Runner, HostSide):
     ) -> None:
         HostSide.__init__(self)
         Runner.__init__(self, PIC18F45K20)
-        #: switches: of the program; the FPGAs are not those as flown
+        #: switches: of the program; the FPGAs are not those as printed
         self.switches = replace(switches, gateware="corrected")
         self.mcu_addressing = mcu_addressing
         self.serial_number = "CS0042"

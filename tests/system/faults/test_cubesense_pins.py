@@ -22,7 +22,7 @@ ENABLES = {Camera.SUN: "SUNEN", Camera.NADIR: "NADEN"}
 PINS = (*ENABLES.values(), "RNW", "EDGE", "SHIFT")
 
 BEFORE = -110  # lines before the frame, before the gap that starts it
-SEARCHING_S = {Camera.SUN: 0.0005, Camera.NADIR: 0.05}  # after the command: amid the edge data
+SEARCHING_S = {Camera.SUN: 0.0004, Camera.NADIR: 0.035}  # after the command: amid the edge data
 
 STORED = CaptureResult.STORED_OWN_SRAM
 
@@ -42,7 +42,7 @@ def capture_ms(ready: Sense, camera: Camera) -> float:
 @pytest.mark.parametrize("camera", Camera)
 @pytest.mark.fault("ack-late")
 def test_late_acknowledge_delays_the_measurement(ready: Sense, camera: Camera) -> None:
-    ready.inject("ack-late", target=ACK[camera], delay_us=10_000)
+    ready.inject("ack-late", target=ACK[camera], delay_us=4_000)  # whatever the frame
     ready.check(camera)
     assert ready.said()[-1] == "rises"
     assert ready.now_s - ready.faults.log[-1].time_ps / 1e12 > 0.008
@@ -67,6 +67,18 @@ def test_missing_acknowledge_times_out(
     ready.faults.clear()
     ready.check(camera)
     ready.check(Camera(1 - camera))
+
+
+@pytest.mark.parametrize("camera", Camera)
+@pytest.mark.fault("fpga-dead")
+def test_dead_fpga_times_out_and_the_other_half_measures(ready: Sense, camera: Camera) -> None:
+    before = ready.picture(camera)
+    ready.inject("fpga-dead", target=HALVES[camera])
+    assert ready.outcome(camera) == TIMED_OUT
+    assert (ready.picture(camera) == before).all()  # nothing was stored
+    ready.check(Camera(1 - camera))
+    ready.faults.clear()
+    ready.check(camera)
 
 
 @pytest.mark.fault("ack-stuck")

@@ -111,7 +111,7 @@ def lookup(meter: Meter) -> list[int]:
 @pytest.mark.parametrize(
     ("listing", "rim", "last"), [(False, (371, 236), 448), (True, (367, 237), 224)]
 )
-@pytest.mark.parametrize("gateware", ["as-flown", "corrected"])
+@pytest.mark.parametrize("gateware", ["both-searches", "corrected"])
 @pytest.mark.parametrize("seed", range(2))
 def test_edge_search_matches_the_published_listing(
     meter: Meter, seed: int, gateware: str, listing: bool, rim: tuple[int, int], last: int
@@ -122,12 +122,12 @@ def test_edge_search_matches_the_published_listing(
     for picture in (rough(rng), tilted, earth(0, 29), chequered()):
         config = EdgeConfig(sub_pixel=False, listing=listing)
         edges = edges_in(picture, meter, config, read_out)
-        expected = edge_detect(map(int, scan(picture, read_out)), rim, last, read_out.as_flown)
+        expected = edge_detect(map(int, scan(picture, read_out)), rim, last, read_out.as_printed)
         assert len(expected) >= 8
         assert (edges.points // 32).tolist() == expected[:MAX_EDGES]
 
 
-def test_as_flown_gateware_and_program_offsets_cancel(meter: Meter) -> None:
+def test_as_printed_gateware_and_program_offsets_cancel(meter: Meter) -> None:
     """The 1 of the program and the start columns of the gateware cancel.
 
     Not as printed, where a bright line that ends with a sample, another one here, ends late.
@@ -137,8 +137,8 @@ def test_as_flown_gateware_and_program_offsets_cancel(meter: Meter) -> None:
         gateware: {tuple(point) for point in edges_in(picture, meter, config, read_out).points}
         for gateware, read_out in READ_OUTS.items()
     }
-    assert places["as-flown"] == places["corrected"]
-    assert len(places["as-flown"]) > 15
+    assert places["both-searches"] == places["corrected"]
+    assert len(places["both-searches"]) > 15
 
 
 @pytest.mark.parametrize("seed", range(12))

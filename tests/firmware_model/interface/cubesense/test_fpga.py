@@ -134,11 +134,11 @@ def test_read_out_rejects_impossible_dimensions(change: dict[str, int], error: s
         fpga.ReadOut(**change)
 
 
-def test_as_flown_scan_ends_at_an_existing_address() -> None:
+def test_as_printed_scan_ends_at_an_existing_address() -> None:
     """The column behind the last one, modulo what the counter holds."""
-    flown = replace(fpga.FULL_SIZE, as_flown=True)
+    flown = replace(fpga.FULL_SIZE, as_printed=True)
     assert [*flown.scan()][-1] == (703, 0)
     small = fpga.ReadOut(
-        columns=32, rows=20, scan_step=8, first_row=3, first_column=7, window=7, as_flown=True
+        columns=32, rows=20, scan_step=8, first_row=3, first_column=7, window=7, as_printed=True
     )
     assert [*small.scan()][-1] == (7, 0)  # 39 of a counter of 5 bits

@@ -144,7 +144,7 @@ def test_each_layout_has_its_registers(layout: str) -> None:
         assert result.hits_a_day == 24 * 60 * 60
 
 
-@pytest.mark.parametrize("gateware", quick(["as-flown", "corrected"], 1))
+@pytest.mark.parametrize("gateware", quick(["both-searches", "corrected"], 1))
 def test_upset_experiment_covers_two_linked_fpgas(gateware: str) -> None:
     results = measured(
         *("cubesense", cubesense.EXPERIMENT),
@@ -159,7 +159,7 @@ def test_upset_experiment_covers_two_linked_fpgas(gateware: str) -> None:
 @pytest.mark.slow
 @pytest.mark.skipif(not have_yosys(), reason="no whole Yosys")
 def test_upsets_of_own_gateware_of_the_pair_are_those_of_the_shipped_one(tmp_path: Path) -> None:
-    top = tops_in(PAIR_TOPS)["cubesense-sun-as-flown"]
+    top = tops_in(PAIR_TOPS)["cubesense-sun-both-searches"]
     (tmp_path / "sun.v").write_text(verilog_file("sun", top))
     design = f"sun={tmp_path / 'sun.v'}"
     shipped, own = (
@@ -167,7 +167,7 @@ def test_upsets_of_own_gateware_of_the_pair_are_those_of_the_shipped_one(tmp_pat
             *("cubesense", cubesense.EXPERIMENT),
             **{"gateware": gateware, "registers": f"sun.{inside}pix_writer.ack", "memory_bits": 0},
         )
-        for gateware, inside in (("as-flown", ""), (design, "design.core."))
+        for gateware, inside in (("both-searches", ""), (design, "design.core."))
     )
     renamed = [replace(one, target=one.target.replace("design.core.", "")) for one in own]
     assert {one.target for one in renamed} == {"sun.pix_writer.ack"}

@@ -1,4 +1,4 @@
-"""The gateware as flown, block by block, against appendices D.3 and D.4 walked through by hand."""
+"""The gateware as printed, block by block, against appendices D.3 and D.4 gone through by hand."""
 
 from collections.abc import Iterable
 from itertools import islice
@@ -13,7 +13,7 @@ from cubestack.hdl.cubesense.nadir_scan import NadirScan
 from cubestack.hdl.cubesense.sun_search import SunSearch
 from cubestack.hdl.cubesense.sun_window import SunWindow
 
-FULL = READ_OUTS["as-flown"]
+FULL = READ_OUTS["both-searches"]
 SMALL = ReadOut(
     21,
     13,
@@ -24,7 +24,7 @@ SMALL = ReadOut(
     window=5,
     window_left=2,
     window_above=1,
-    as_flown=True,
+    as_printed=True,
 )
 DARK, LIT = 199, 200
 
@@ -78,7 +78,7 @@ def test_declared_scan_matches_the_published_listing(size: ReadOut) -> None:
     assert list(size.scan()) == scan_by_hand(size)
 
 
-def test_as_flown_scan_starts_at_column_1() -> None:
+def test_as_printed_scan_starts_at_column_1() -> None:
     pixels = list(FULL.scan())
     assert pixels[:2] == [None, (1, 15)]
     assert pixels[640:642] == [(0, 79), (1, 79)]
@@ -119,7 +119,7 @@ def lit(*places: tuple[int, int]) -> list[list[int]]:
         ([lit(), lit((9, 9))], (9, 9)),  # nothing changes without a bright pixel
     ],
 )
-def test_as_flown_sun_search_notes_the_published_bright_pixel(
+def test_as_printed_sun_search_notes_the_published_bright_pixel(
     pictures: list[list[list[int]]], place: tuple[int, int]
 ) -> None:
     assert found(*pictures) == place
@@ -133,7 +133,7 @@ def window(x: int, y: int) -> list[int]:
 
 
 @pytest.mark.parametrize("sun", [(8, 6), (1, 0), (20, 12), (0, 6)])
-def test_as_flown_sun_window_wraps_at_the_image_border(sun: tuple[int, int]) -> None:
+def test_as_printed_sun_window_wraps_at_the_image_border(sun: tuple[int, int]) -> None:
     left, top = SMALL.window_origin(*sun)
     assert (left, top) == (sun[0] - 2, sun[1] - 1)
     places = ((left + i) % 32 + 32 * ((top + j) % 16) for j in range(6) for i in range(5))
