@@ -13,6 +13,18 @@ from cubestack.host.errors import install_command
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+MOST_LETTERS = 60
+"""Names below an axis that fit beside each other."""
+
+MOST_INSIDE = 4
+"""Lines of a legend inside of a panel; a longer one is placed below it."""
+
+LONG_NAME = 40
+"""Letters of a line of such a legend that does not fit beside another."""
+
+LEGEND_LINE = 0.17
+"""Height of a line of such a legend, in inches."""
+
 LINES = ("-", "--", "-.", ":")
 MARKS = {"right": "o", "refused": "s", "wrong": "x", "failed": "^"}
 COLOURS = {"right": "#1a7f37", "refused": "#9a9a9a", "wrong": "#c62828", "failed": "#000000"}
@@ -58,11 +70,27 @@ def rate_curves(
             at, shares, (below, above), fmt=style, color=COLOURS[outcome], label=outcome, capsize=3
         )
     if not numbers:
-        panel.set_xticks(at, [str(place) for place in places])
+        names = [str(place) for place in places]
+        crowded = sum(map(len, names)) > MOST_LETTERS
+        side = {"rotation": 30, "ha": "right", "rotation_mode": "anchor"} if crowded else {}
+        panel.set_xticks(at, names, **side)
     panel.set(xlabel=axis, ylabel="% of results, with 95 % limits", ylim=(-4, 104))
     panel.grid(alpha=0.3)
-    panel.legend(fontsize="small")
+    _explain(drawn, "small")
     return png(drawn)
+
+
+def _explain(drawn: "Figure", size: str) -> None:
+    """A legend that hides no curve: below the panel, if it is long."""
+    (panel,) = drawn.axes
+    names = panel.get_legend_handles_labels()[1]
+    if len(names) <= MOST_INSIDE:
+        panel.legend(fontsize=size)
+        return
+    columns = 2 if max(map(len, names)) < LONG_NAME else 1
+    width, height = drawn.get_size_inches()
+    drawn.set_size_inches(width, height + LEGEND_LINE * -(-len(names) // columns))
+    drawn.legend(fontsize=size, loc="outside lower left", ncols=columns)
 
 
 def error_curves(
@@ -94,12 +122,12 @@ def error_curves(
         above = [min(share + band, 100) for share in shares]
         panel.fill_between(sizes, below, above, step="post", alpha=0.12, color=line.get_color())
     for number, (value, text) in enumerate(marks):
-        panel.axvline(value, color="black", linewidth=0.8, linestyle=LINES[-1 - number % 2])
-        panel.text(value, 2, f" {text}", rotation=90, fontsize="xx-small", va="bottom", ha="right")
+        style = LINES[-1 - number % len(LINES)]
+        panel.axvline(value, color="black", linewidth=0.8, linestyle=style, label=text)
     what, unit = name.rsplit("_", 1)
     panel.set(xscale="log", xlabel=f"{what.replace('_', ' ')}, {unit}", ylabel="% smaller")
     panel.grid(alpha=0.3)
-    panel.legend(fontsize="x-small")
+    _explain(drawn, "x-small")
     return png(drawn)
 
 

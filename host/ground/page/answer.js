@@ -1,5 +1,6 @@
 // The latest result in words, its angles beside the truth, and the flags that are set.
 
+import { axes, turn } from "./attitude.js";
 import { make, note } from "./dom.js";
 import { apart, fromParts } from "./sphere.js";
 
@@ -14,10 +15,10 @@ export class Answer {
     const heads = ["angle", "measured", "truth", "error"].map((text) => make("th", { textContent: text, scope: "col" }));
     this.angles = make("tbody");
     this.table = make("table", { id: "angles", hidden: true }, make("thead", {}, make("tr", {}, ...heads)), this.angles);
-    this.truthless = note("", { id: "no-truth" });
+    this.truth = note("", { id: "truth" });
     this.flags = make("ul", { id: "flags-set", className: "flags" });
     this.flags.setAttribute("aria-label", "flags that are set");
-    place.append(this.summary, this.table, this.truthless, this.flags);
+    place.append(this.summary, this.table, this.truth, this.flags);
     this.emulated = !about.missing.controls;
   }
 
@@ -29,13 +30,25 @@ export class Answer {
     const rows = angleRows(results, truth);
     this.table.hidden = !rows.length;
     this.angles.replaceChildren(...rows);
-    this.truthless.textContent = this.emulated ? "" : "The truth is known for emulated devices only.";
+    const off = error(results, truth);
+    const compared = off === null ? "Results are compared with the truth." : `${small(off)} from the truth.`;
+    this.truth.textContent = this.emulated ? compared : "The truth is known for emulated devices only.";
   }
 
   // `set`: elements of the flags that are set.
   showFlags(set) {
     this.flags.replaceChildren(...set);
   }
+}
+
+// Angle between the measured attitude and the true one, or the largest between directions, in deg;
+// null if either is unknown.
+function error(results, truth) {
+  const known = ({ ra_deg, dec_deg, roll_deg }) => [ra_deg, dec_deg, roll_deg].every(Number.isFinite);
+  if (known(results) && known(truth)) return turn(axes(results), axes(truth));
+  const found = directions(results, truth).map(({ answer, true_ }) => answer && true_ && apart(answer, true_));
+  const angles = found.filter((angle) => angle !== null);
+  return angles.length ? Math.max(...angles) : null;
 }
 
 // A row for each angle, and the error of each direction.
@@ -87,7 +100,7 @@ function label(name) {
 }
 
 function text(deg) {
-  return deg === null ? "–" : `${deg.toFixed(4)}°`;
+  return deg === null ? "–" : `${deg.toFixed(4).replace(/^-(?=[0.]+$)/, "")}°`;
 }
 
 function small(deg) {

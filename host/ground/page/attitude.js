@@ -56,7 +56,7 @@ export class Attitude {
     else words.push(`no valid attitude${this.measured ? "; showing the last one" : ""}`);
     if (this.truth) words.push(`truth ${text(truth)}`);
     if (this.truth && valid)
-      words.push(`total error ${apart(this.measured, this.truth).toFixed(4)}°`);
+      words.push(`total error ${turn(this.measured, this.truth).toFixed(4)}°`);
     this.status.textContent = words.join("; ");
     this.drawSoon();
   }
@@ -156,7 +156,7 @@ export class Attitude {
 }
 
 // Camera axes on the sky; roll turns the image's up from north to east.
-function axes({ ra_deg, dec_deg, roll_deg }) {
+export function axes({ ra_deg, dec_deg, roll_deg }) {
   const boresight = vector(ra_deg, dec_deg);
   const north = vector(ra_deg, dec_deg + 90);
   const east = vector(ra_deg + 90, 0);
@@ -166,7 +166,7 @@ function axes({ ra_deg, dec_deg, roll_deg }) {
 }
 
 // Rotation angle between two sets of axes in degrees, precise for small ones too.
-function apart(a, b) {
+export function turn(a, b) {
   const rows = (one) => [one.right, one.up, one.boresight];
   const far = rows(a).flatMap((row, i) => row.map((part, j) => (part - rows(b)[i][j]) ** 2));
   const size = Math.sqrt(far.reduce((sum, part) => sum + part, 0)); // sqrt(8) sin(angle / 2)

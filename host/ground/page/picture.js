@@ -160,7 +160,7 @@ export class Pictures {
     this.canvas.width = width;
     this.canvas.height = height;
     this.canvas.setAttribute("aria-label", `${name}, ${width} x ${height}`);
-    this.value.textContent = `${name}: ${width} x ${height}, at ${this.changed_s[name]} s`;
+    this.value.textContent = `${name}: ${width} x ${height}, at ${this.changed_s[name].toFixed(3)} s`;
     this.draw();
   }
 
@@ -182,7 +182,7 @@ export class Pictures {
     const hidden = this.zoomFrame.drawOver((pen, place, size) =>
       drawDetections(pen, this.detected, place, size, this.magnitudes.checked),
     );
-    this.hidden.textContent = hidden ? `names hidden: ${hidden}; zoom in to read them` : "";
+    this.hidden.textContent = hidden ? `${hidden} names hidden: zoom in` : "";
   }
 
   point(event) {

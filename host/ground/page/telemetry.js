@@ -1,8 +1,10 @@
 // A telemetry frame, and plots of any of its numbers over time.
 
-import { atNextFrame, beside, choose, labelled, make, note, row } from "./dom.js";
+import { atNextFrame, beside, button, choose, labelled, make, note, row } from "./dom.js";
 
 const HEIGHT = 260;
+const ZOOM = 2;
+const MOVE = 0.25; // share of the time span
 const MOST_POINTS = 3600; // of a plot: one hour at one point per second
 
 const COLOURS = ["#2f81f7", "#d29922", "#3fb950", "#db61a2", "#a371f7", "#f0883e"];
@@ -22,10 +24,23 @@ export class Telemetry {
     this.meaning = note();
     this.table = make("tbody");
     this.figure = make("div", { id: "plot" });
+    this.zoomed = false; // to a time span that new values do not change
+    const look = (text, id, title, factor, share) =>
+      Object.assign(button(text, id, () => this.look(factor, share)), { title, ariaLabel: title });
+    this.buttons = row(
+      look("+", "plot-in", "Shorter time span", 1 / ZOOM, 0),
+      look("−", "plot-out", "Longer time span", ZOOM, 0),
+      look("◀", "plot-earlier", "Earlier", 1, -MOVE),
+      look("▶", "plot-later", "Later", 1, MOVE),
+      button("All", "plot-all", () => this.all()),
+    );
+    this.buttons.id = "plot-buttons";
+    this.buttons.hidden = true;
     place.append(
       row(labelled("frame", this.name)),
       this.meaning,
       make("table", {}, this.table),
+      this.buttons,
       this.figure,
     );
     new ResizeObserver(() => this.fit()).observe(this.figure);
@@ -93,18 +108,21 @@ export class Telemetry {
   draw(more = false) {
     const data = [this.times, ...this.plotted.map((p) => p.values)];
     if (more && this.plot) {
-      this.plot.setData(data);
+      this.plot.setData(data, !this.zoomed);
+      if (this.zoomed) this.plot.redraw();
       return;
     }
     this.plot?.destroy();
     this.plot = null;
+    this.zoomed = false;
+    this.buttons.hidden = !this.plotted.length;
     if (!this.plotted.length) {
       this.times = [];
       return;
     }
     const text = getComputedStyle(document.body).color;
     const axis = { stroke: text, grid: { stroke: "#8884", width: 1 } };
-    const time = { ...axis, label: "time of day; drag to zoom, double click for all" };
+    const time = { ...axis, label: "time of day" };
     const units = new Set(this.plotted.map((p) => p.field.unit).filter(Boolean));
     const series = this.plotted.map((p, index) => ({
       label: `${p.frame}.${p.field.name}${p.field.unit ? ` [${p.field.unit}]` : ""}`,
@@ -117,11 +135,26 @@ export class Telemetry {
         width: this.figure.clientWidth || 300,
         height: HEIGHT,
         axes: [time, { ...axis, label: [...units].join(", ") || "value" }],
-        series: [{ label: "time" }, ...series],
+        series: [{ label: "time", value: "{HH}:{mm}:{ss}.{fff}" }, ...series],
+        hooks: { setSelect: [() => (this.zoomed = true)] }, // by dragging
       },
       data,
       this.figure,
     );
+    this.plot.over.addEventListener("dblclick", () => (this.zoomed = false));
+  }
+
+  // Zooms by a factor, and moves by a share of the visible time span.
+  look(factor, share) {
+    const { min, max } = this.plot.scales.x;
+    const [middle, half] = [(min + max) / 2 + share * (max - min), ((max - min) / 2) * factor];
+    this.zoomed = true;
+    this.plot.setScale("x", { min: middle - half, max: middle + half });
+  }
+
+  all() {
+    this.zoomed = false;
+    this.draw(true);
   }
 
   fit() {

@@ -2,13 +2,16 @@
 // whose values have names.
 
 import { atNextFrame, button, choose, labelled, make, note, row } from "./dom.js";
+import { line, sharpPen } from "./draw.js";
 import { hasNames, valueName } from "./telemetry.js";
+import { TimeAxis } from "./timeaxis.js";
 
-const SPANS_S = [60, 300, 1800];
+const LONGEST_S = 1800;
 const MOST_CHANGES = 20_000; // per band
 const ROW = 42;
 const TEXT = 20; // above the band
-const FOOT = 22;
+const FOOT = 40; // labels of the axis, and its name
+const TICK = 5;
 const PADDING = 32; // of the section, left and right
 const COLOURS = ["#58a6ff", "#d29922", "#3fb950", "#db61a2", "#a98bf7", "#f0883e", "#9aa3af"];
 const STRIPES = 6; // width
@@ -28,19 +31,18 @@ export class Timeline {
     );
     const none = !this.fields.size;
     this.field = choose([...this.fields.keys()], { id: "band", disabled: none });
-    this.span = choose(
-      SPANS_S.map((span) => ({ value: String(span), textContent: `${span} s` })),
-      { id: "span", onchange: () => this.draw() },
-    );
     const add = button("Add band", "add-band", () => this.choose(this.field.value));
     add.disabled = none;
     this.buttons = make("div", { className: "row", id: "bands" });
     this.status = note("", { id: "timeline-status" });
     this.canvas = make("canvas", { id: "bands-canvas", width: 300, height: 1, role: "img" });
-    this.canvas.setAttribute("aria-label", "named values over time");
+    const keys = "arrow keys read values, with shift they move the time; + and - zoom, 0 follows";
+    this.canvas.setAttribute("aria-label", `named values over time; ${keys}`);
+    this.axis = new TimeAxis(this.canvas, LONGEST_S, this.drawSoon);
+    this.clock = about.missing.controls ? "time since the page was opened, s" : "virtual time, s";
     this.legend = make("ul", { id: "timeline-legend", className: "legend" });
     place.append(
-      row(labelled("field", this.field), add, labelled("time span", this.span)),
+      row(labelled("field", this.field), add, ...this.axis.buttons),
       this.buttons,
       this.status,
       this.canvas,
@@ -74,8 +76,11 @@ export class Timeline {
 
   // Texts by name, and telemetry by frame, at a time in seconds.
   update(words, frames, time) {
-    if (this.time > time) this.bands.clear(); // it went back in time
-    this.time = time;
+    if (this.time > time) {
+      this.bands.clear(); // it went back in time
+      this.axis.follow();
+    }
+    this.time = this.axis.now = time;
     const found = { ...words };
     for (const [name, { frame, field }] of this.chosen) {
       const values = frames[frame];
@@ -88,7 +93,7 @@ export class Timeline {
       const last = changes.at(-1);
       if (last) last.until = time;
       if (last?.word !== word) changes.push({ from: time, until: time, word });
-      const begin = time - SPANS_S.at(-1);
+      const begin = time - LONGEST_S;
       while (changes[0].until < begin || changes.length > MOST_CHANGES) changes.shift();
     }
     this.drawSoon();
@@ -98,19 +103,15 @@ export class Timeline {
     if (!this.canvas.isConnected) return; // another target is shown
     const height = this.bands.size ? ROW * this.bands.size + FOOT : 1;
     const width = Math.max(this.canvas.parentElement.clientWidth - PADDING, 1);
-    if (this.canvas.height !== height) this.canvas.height = height;
-    if (this.canvas.width !== width) this.canvas.width = width;
-    const pen = this.canvas.getContext("2d");
-    pen.clearRect(0, 0, width, height);
+    Object.assign(this.canvas.style, { width: `${width}px`, height: `${height}px` });
+    const pen = sharpPen(this.canvas, width, height);
     if (!this.bands.size) {
       this.status.textContent = this.none ?? "no values yet";
       this.explain([]);
       return;
     }
     const text = getComputedStyle(document.body).color;
-    const span = Number(this.span.value);
-    const begin = Math.max(this.time - span, 0);
-    const x = (time) => ((time - begin) / span) * width;
+    const { axis } = this;
     const shown = new Set();
     pen.font = "13px system-ui, sans-serif";
     pen.textBaseline = "middle";
@@ -122,19 +123,41 @@ export class Timeline {
       pen.fillStyle = "#8883";
       pen.fillRect(0, top + TEXT, width, ROW - TEXT - 4);
       for (const { from, until, word } of changes) {
-        if (until < begin) continue;
-        const left = x(Math.max(from, begin));
+        if (until < axis.first || from > axis.last) continue;
+        const [left, right] = [axis.x(Math.max(from, axis.first)), axis.x(Math.min(until, axis.last))];
         shown.add(word);
-        this.band(pen, word, left, top + TEXT, Math.max(x(until) - left, 1), ROW - TEXT - 4);
+        this.band(pen, word, left, top + TEXT, Math.max(right - left, 1), ROW - TEXT - 4);
       }
     });
-    pen.fillStyle = text;
-    pen.fillText(`${begin.toFixed(0)} s`, 0, height - FOOT / 2);
-    pen.textAlign = "right";
-    pen.fillText(`${(begin + span).toFixed(0)} s`, width, height - FOOT / 2);
-    const words = [...this.bands].map(([name, changes]) => `${name} ${changes.at(-1).word}`);
-    this.status.textContent = words.join(", ");
+    this.drawAxis(pen, text, width, height - FOOT);
+    this.status.textContent = this.read();
     this.explain([...shown].sort());
+  }
+
+  drawAxis(pen, text, width, bottom) {
+    const { axis } = this;
+    pen.strokeStyle = pen.fillStyle = text;
+    line(pen, [0, bottom], [width, bottom]);
+    for (const { time, text: label } of axis.ticks()) {
+      const x = axis.x(time);
+      const half = pen.measureText(label).width / 2;
+      line(pen, [x, bottom], [x, bottom + TICK]);
+      pen.fillText(label, Math.min(Math.max(x - half, 0), width - 2 * half), bottom + TICK + 8);
+    }
+    pen.fillText(this.clock, (width - pen.measureText(this.clock).width) / 2, bottom + FOOT - 8);
+    if (axis.cursor === null) return;
+    const x = axis.x(axis.cursor);
+    line(pen, [x, 0], [x, bottom]);
+  }
+
+  // The values at the cursor, or the latest ones.
+  read() {
+    const { cursor } = this.axis;
+    const words = [...this.bands].map(([name, changes]) => {
+      const at = cursor === null ? changes.at(-1) : changes.findLast((one) => one.from <= cursor);
+      return `${name} ${at && (cursor === null || at.until >= cursor) ? at.word : "–"}`;
+    });
+    return (cursor === null ? "" : `at ${cursor.toFixed(2)} s: `) + words.join(", ");
   }
 
   band(pen, word, left, top, wide, high) {

@@ -34,6 +34,14 @@ ORDER = ("failed", "wrong", "refused", "right")
 
 
 @dataclass(frozen=True)
+class Figure:
+    """A figure's PNG, and what one sees in it."""
+
+    png: bytes
+    caption: str
+
+
+@dataclass(frozen=True)
 class Case:
     """A row with its number in the file, a caption, and the image as JPEG, if any."""
 
@@ -97,7 +105,8 @@ body { font: 15px/1.5 sans-serif; color: #111; background: #fff; max-width: 60em
        padding: 0 1em }
 table { border-collapse: collapse } th, td { border: 1px solid #999; padding: .2em .6em;
        text-align: right } th:first-child, td:first-child { text-align: left }
-img { max-width: 100% } code { background: #eee } .worse { font-weight: bold }
+img { max-width: 100% } figure { margin: 0 0 1.5em } code { background: #eee }
+.worse { font-weight: bold }
 """
 
 
@@ -117,20 +126,31 @@ def write(
     if not found:
         raise ValueError(f"{folder.path} has no rows yet")
     pictures = {
-        f"rates-{name}.png": _swept(folder, name, found)
+        f"rates-{name}.png": Figure(
+            _swept(folder, name, found),
+            f"How results ended at each value of {name}, over all values of the other options; "
+            "bars are 95 % limits.",
+        )
         for name, values in folder.plan.grid.items()
         if len(values) > 1
     }
     measured = experiment_of(registered(folder.plan.device), folder.plan.command)
+    published = "; vertical lines are published values"
     for name, points in errors(folder).items():
         curves = {told(point): values for point, values in points.items()}
         marks = [(mark.value, mark.text) for mark in measured.marks if mark.error == name]
-        pictures[f"{name}.png"] = error_curves(name, curves, marks)
+        pictures[f"{name}.png"] = Figure(
+            error_curves(name, curves, marks),
+            "Share of the results whose error is smaller, by point of the grid, with the number of "
+            f"results; bands are 95 % limits{published if marks else ''}.",
+        )
     done = (row.result for row in folder.rows() if row.result)
     sections = list(measured.sections(done))
-    pictures |= {f"{each.title.replace(' ', '-')}.png": each.png for each in sections if each.png}
+    pictures |= {
+        f"{each.title.replace(' ', '-')}.png": Figure(each.png, "") for each in sections if each.png
+    }
     page = _page(folder, found, pictures, sections, changes, against, cases)
-    write_outputs(folder.path, {PAGE: page, **pictures})
+    write_outputs(folder.path, {PAGE: page, **{name: one.png for name, one in pictures.items()}})
     return [folder.path / name for name in (PAGE, *pictures)]
 
 
@@ -153,7 +173,7 @@ def _swept(folder: Folder, name: str, found: Mapping[Point, Counter[str]]) -> by
 def _page(
     folder: Folder,
     found: Mapping[Point, Counter[str]],
-    pictures: Mapping[str, bytes],
+    pictures: Mapping[str, Figure],
     sections: Sequence[Section],
     changes: Sequence[Change],
     against: Path | None,
@@ -178,21 +198,28 @@ def _page(
     for section in sections:
         if section.rows:
             parts += [f"<h2>{escape(section.title)}</h2>", html_table(section.head, section.rows)]
-    for name, png in pictures.items():
-        parts.append(f"<h2>{escape(Path(name).stem.replace('_', ' ').replace('-', ' '))}</h2>")
-        data = b64encode(png).decode("ascii")
-        parts.append(f'<img alt="{escape(name)}" src="data:image/png;base64,{data}">')
+    for name, one in pictures.items():
+        title = Path(name).stem.replace("_", " ").replace("-", " ")
+        parts += [f"<h2>{escape(title)}</h2>", _figure("png", one.png, one.caption or title)]
     if cases:
-        parts.append("<h2>Worst cases with the camera images, contrast stretched</h2>")
+        parts += [
+            "<h2>Worst cases</h2>",
+            "<p>Failed, wrong and refused results first, then the largest errors. The images are "
+            "what the camera saw, contrast stretched.</p>",
+        ]
     for case in cases:
-        data = b64encode(case.jpeg).decode("ascii")
-        image = f'<br><img alt="" src="data:image/jpeg;base64,{data}">' if case.jpeg else ""
-        parts.append(f"<p>row {case.number}: {escape(case.text)}{image}</p>")
+        parts.append(_figure("jpeg", case.jpeg, f"row {case.number}: {case.text}"))
     failed = [(number, row) for number, row in enumerate(folder.rows()) if row.outcome == "failed"]
     if failed:
         lines = [[str(number), row.reason] for number, row in failed[:FAILURES]]
         parts += [f"<h2>{len(failed)} failed</h2>", html_table(["row, for replay", "error"], lines)]
     return "\n".join([*parts, "</html>"]) + "\n"
+
+
+def _figure(kind: str, image: bytes, caption: str) -> str:
+    data = b64encode(image).decode("ascii")
+    shown = f'<img alt="{escape(caption)}" src="data:image/{kind};base64,{data}">' if image else ""
+    return f"<figure>{shown}<figcaption>{escape(caption)}</figcaption></figure>"
 
 
 def _rates(point: Point, ended: Counter[str]) -> list[str]:

@@ -9,8 +9,11 @@ from cubestack.host.studies.powerfail.cases import KINDS
 from cubestack.host.studies.powerfail.course import Course
 from cubestack.host.studies.powerfail.trial import Row
 
-LEFT, TOP, STEP, WORD, BAND = 90, 24, 10, 7, 14
-"""Lengths in pixels: margins, width of an operation, heights of a word and of a kind of case."""
+LEFT, STEP, WORD, BAND = 100, 10, 11, 14
+"""Lengths in pixels: margin, width of an operation, heights of a word and of a kind of case."""
+
+TEXT, LETTER = 11, 5.2
+"""Height of a line of text, and the mean width of a letter."""
 
 PROGRAMMED, ERASED, LINE = "#4b6cb7", "#e9b44c", "#999"
 RIGHT_COLOUR, WRONG_COLOUR = "#1a7f37", "#c62828"
@@ -22,14 +25,18 @@ MOST_WORDS = 120
 def flash_picture(course: Course, rows: Sequence[Row]) -> str:
     """Operations from left to right: words of the flash above, cuts by their kind below."""
     words = _words(course.operations)
-    height = TOP + WORD * len(words) + BAND * (len(KINDS) + 2)
+    labels = [*_labels(course)]
+    top = TEXT * (max((line for *_, line in labels), default=0) + 1) + 10
+    height = top + WORD * len(words) + BAND * (len(KINDS) + 2)
     width = LEFT + STEP * (len(course.operations) + 2)
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}" '
-        'font-family="sans-serif" font-size="9">',
-        *_steps(course, height),
+        'font-family="sans-serif" font-size="10">',
+        *_steps(labels, height),
+        f'<g transform="translate(0 {top})">',
         *_cells(course.operations, words),
-        *_cuts(rows, TOP + WORD * len(words) + BAND),
+        "</g>",
+        *_cuts(rows, top + WORD * len(words) + BAND),
         "</svg>",
     ]
     return "\n".join(parts)
@@ -41,13 +48,23 @@ def _words(operations: Sequence[FlashOperation]) -> Mapping[int, int]:
     return {address: row for row, address in enumerate(sorted(found)[:MOST_WORDS])}
 
 
-def _steps(course: Course, height: int) -> Iterator[str]:
-    """A line where each step begins."""
+def _labels(course: Course) -> Iterator[tuple[int, str, int]]:
+    """Place and text of each step's label, and its line, in which it covers no other."""
+    ends = list[float]()
     for number, start in enumerate(course.started, start=1):
-        place = sum(one.time_ps < start for one in course.operations)
-        x = LEFT + STEP * place
-        yield f'<line x1="{x}" x2="{x}" y1="12" y2="{height}" stroke="{LINE}" stroke-width=".5"/>'
-        yield f'<text x="{x + 1}" y="10">step {number}, {start / 1e9:.1f} ms</text>'
+        x = LEFT + STEP * sum(one.time_ps < start for one in course.operations)
+        text = f"step {number}, {start / 1e9:.1f} ms"
+        line = next((one for one, end in enumerate(ends) if end < x), len(ends))
+        ends[line : line + 1] = [x + LETTER * len(text) + 4]
+        yield x, text, line
+
+
+def _steps(labels: Sequence[tuple[int, str, int]], height: int) -> Iterator[str]:
+    """A line where each step begins."""
+    for x, text, line in labels:
+        y = TEXT * (line + 1)
+        yield f'<line x1="{x}" x2="{x}" y1="{y}" y2="{height}" stroke="{LINE}" stroke-width=".5"/>'
+        yield f'<text x="{x + 2}" y="{y - 2}">{text}</text>'
 
 
 def _cells(operations: Sequence[FlashOperation], words: Mapping[int, int]) -> Iterator[str]:
@@ -55,7 +72,7 @@ def _cells(operations: Sequence[FlashOperation], words: Mapping[int, int]) -> It
     since = dict[int, int]()
     for address, row in words.items():
         if address % PAGE_BYTES == 0 or address - 4 not in words:
-            yield f'<text x="2" y="{TOP + WORD * row + 7}">{address:#010x}</text>'
+            yield f'<text x="2" y="{WORD * (row + 1) - 2}">{address:#010x}</text>'
     for place, operation in enumerate(operations):
         for change in operation.changes:
             if not change.erased:
@@ -73,7 +90,7 @@ def _cells(operations: Sequence[FlashOperation], words: Mapping[int, int]) -> It
 
 
 def _bar(row: int, start: int, end: int, colour: str) -> str:
-    x, y = LEFT + STEP * start, TOP + WORD * row
+    x, y = LEFT + STEP * start, WORD * row
     return (
         f'<rect x="{x}" y="{y}" width="{STEP * (end - start)}" height="{WORD - 1}" '
         f'fill="{colour}"/>'

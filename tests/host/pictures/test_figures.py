@@ -35,7 +35,8 @@ def panel_of(figures: list[Any]) -> Any:
 
 
 def legend_of(panel: Any) -> list[str]:
-    return [text.get_text() for text in panel.get_legend().get_texts()]
+    legend = panel.get_legend() or panel.figure.legends[0]
+    return [text.get_text() for text in legend.get_texts()]
 
 
 def bars_of(container: Any) -> list[list[float]]:
@@ -95,16 +96,37 @@ def test_error_curves_are_distributions_with_confidence_bands(figures: list[Any]
         assert points[:, 1].min() == 0
         assert points[:, 1].max() == 100
     assert len({look(line) for line in curves}) == 6
-    assert legend_of(panel) == [f"point {n} ({50 + n})" for n in range(6)]
+    named = [f"point {n} ({50 + n})" for n in range(6)]
+    assert legend_of(panel) == [*named, "published", "other"]
     marks = panel.lines[6:]
     assert [line.get_xdata()[0] for line in marks] == [0.02, 0.3]
     assert len({look(line) for line in marks}) == 2
-    assert [(text.get_position()[0], text.get_text()) for text in panel.texts] == [
-        (0.02, " published"),
-        (0.3, " other"),
-    ]
+    assert [line.get_label() for line in marks] == ["published", "other"]
     assert panel.get_xlabel() == "error cross, deg"
     assert panel.get_xscale() == "log"
+
+
+@pytest.mark.parametrize("name", ["point {}", "false stars = {}, hazard = ['moon', 'planets']"])
+def test_long_legend_hides_no_curve_and_is_whole(
+    name: str, figures: list[Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    error_curves("error_deg", {name.format(n): [0.1, 0.2, 0.4] for n in range(12)}, [(0.2, "mean")])
+    panel = panel_of(figures)
+    monkeypatch.undo()
+    panel.figure.savefig(BytesIO())
+    (legend,) = panel.figure.legends
+    box, whole = legend.get_window_extent(), panel.figure.bbox
+    assert whole.x0 <= box.x0 < box.x1 <= whole.x1
+    assert whole.y0 <= box.y0 < box.y1 <= panel.get_tightbbox().y0
+
+
+def test_long_names_below_an_axis_are_turned(figures: list[Any]) -> None:
+    few = {kind: [(0.5, 0.4, 0.6)] * 3 for kind in ("right", "wrong")}
+    for names in (["a", "b", "c"], [["a hazard with a long name", n] for n in range(3)]):
+        figures.clear()
+        rate_curves("hazard", names, few)
+        turned = {text.get_rotation() for text in panel_of(figures).get_xticklabels()}
+        assert turned == ({0.0} if names[0] == "a" else {30.0})
 
 
 PLACES = [

@@ -53,6 +53,72 @@ def test_telemetry_word_is_shown_as_a_band(page: Any) -> None:
     assert page.locator("#band option").all_inner_texts() != fields
 
 
+@pytest.mark.slow
+def test_timeline_is_read_zoomed_and_moved(page: Any) -> None:
+    page.click("#add-band")
+    page.wait_for_selector("#timeline-legend li")
+    canvas, status = page.locator("#bands-canvas"), page.locator("#timeline-status")
+
+    def read(share: float) -> float:
+        """Time at a share of the axis, by the pointer; the values are read there."""
+        box = canvas.bounding_box()
+        page.hover("#bands-canvas", position={"x": share * box["width"], "y": 30})
+        page.wait_for_function(
+            "() => document.querySelector('#timeline-status').textContent.startsWith('at ')"
+        )
+        return float(status.inner_text().removeprefix("at ").split(" s: ")[0])
+
+    assert read(0.75) - read(0.25) == pytest.approx(30, abs=0.5)
+    following = "#timeline-follow[aria-pressed={}]"
+    canvas.press("+")
+    assert read(0.75) - read(0.25) == pytest.approx(15, abs=1.5)  # time passes meanwhile
+    page.wait_for_selector(following.format("true"))
+    page.click("#timeline-out")
+    page.click("#timeline-in")
+    page.wait_for_function(
+        "() => Number(document.querySelector('#time').textContent.match(/[0-9.]+/)) > 33"
+    )
+    canvas.press("Shift+ArrowLeft")
+    page.wait_for_selector(following.format("false"))
+    held = read(0.5)
+    assert read(0.5) == held
+    canvas.press("ArrowLeft")
+    read_there = "parseFloat(document.querySelector('#timeline-status').textContent.slice(3))"
+    page.wait_for_function(f"held => {read_there} < held", arg=held)
+    canvas.press("0")
+    page.wait_for_selector(following.format("true"))
+    page.mouse.move(0, 0)
+    page.wait_for_function(
+        "() => !document.querySelector('#timeline-status').textContent.startsWith('at ')"
+    )
+
+
+@pytest.mark.slow
+def test_zoomed_plot_stays_while_values_arrive(page: Any) -> None:
+    page.select_option("#frame", "Identification")
+    page.check("[title='plot RuntimeSeconds']")
+    points = "() => document.querySelector('#plot canvas')"
+    page.wait_for_function(points)
+    sent = "Number(document.querySelector('#link-health').textContent.match(/[0-9]+/))"
+
+    def latest() -> str:
+        """Time at the right edge of the plot, after three more updates."""
+        before = page.evaluate(sent)
+        page.wait_for_function(f"before => {sent} > before + 3", arg=before)
+        box = page.locator("#plot .u-over").bounding_box()
+        page.hover("#plot .u-over", position={"x": 5, "y": 20})
+        page.hover("#plot .u-over", position={"x": box["width"] - 1, "y": 20})
+        return str(page.locator("#plot .u-legend .u-value").first.inner_text())
+
+    assert latest() != latest()
+    page.click("#plot-in")
+    page.click("#plot-earlier")
+    held = latest()
+    assert latest() == held
+    page.click("#plot-all")
+    assert latest() != held
+
+
 def test_command_changes_the_device(page: Any) -> None:
     page.select_option("#frame", "DetectionThresholdValues")
     page.select_option("#command", "setDetectionThresholds")

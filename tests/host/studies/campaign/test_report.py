@@ -212,7 +212,7 @@ def test_report_has_the_sections_of_the_experiment(
     assert "<tr><td>a&lt;b</td><td>7</td></tr>\n<tr><td>c</td><td>9</td></tr>" in text
     assert figures[-1].name == "as-a-figure.png"
     assert figures[-1].read_bytes() == b"\x89PNG figure"
-    assert 'alt="as-a-figure.png"' in text
+    assert 'alt="as a figure"' in text
     assert len(seen) == len(list(folder.rows()))
 
 
