@@ -34,7 +34,7 @@ class PortCommands:
 
     def commands(self) -> list[ShellCommand]:
         return [
-            ShellCommand(IMAGE, "download the image", self._image),
+            ShellCommand(IMAGE, "download the image into a new file", self._image),
             ShellCommand(BENCH, "send a letter of the bench protocol", self._bench),
             ShellCommand(RAW, "send bytes, show the answer", self._raw),
         ]

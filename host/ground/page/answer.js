@@ -31,7 +31,8 @@ export class Answer {
     this.table.hidden = !rows.length;
     this.angles.replaceChildren(...rows);
     const off = error(results, truth);
-    const compared = off === null ? "Results are compared with the truth." : `${small(off)} from the truth.`;
+    const what = truth.ra_deg === undefined ? "Direction" : "Attitude";
+    const compared = off === null ? "Results are compared with the truth." : `${what} ${small(off)} from the truth.`;
     this.truth.textContent = this.emulated ? compared : "The truth is known for emulated devices only.";
   }
 

@@ -182,7 +182,7 @@ export class Pictures {
     const hidden = this.zoomFrame.drawOver((pen, place, size) =>
       drawDetections(pen, this.detected, place, size, this.magnitudes.checked),
     );
-    this.hidden.textContent = hidden ? `${hidden} names hidden: zoom in` : "";
+    this.hidden.textContent = hidden ? `${hidden} name${hidden > 1 ? "s" : ""} hidden: zoom in` : "";
   }
 
   point(event) {
