@@ -70,6 +70,12 @@ def test_site_search_works_from_the_file_system(site: Path, chromium: Any) -> No
     page.close()
 
 
+def test_page_that_runs_in_the_browser_is_reached_and_leads_back(site: Path) -> None:
+    assert 'href="try/index.html"' in (site / "try.html").read_text(encoding="utf-8")
+    assert 'href="../try.html"' in (site / "try/index.html").read_text(encoding="utf-8")
+    assert not (site / "try/board").exists()
+
+
 @pytest.mark.parametrize("name", DIAGRAMS)
 def test_diagrams_scroll_on_a_narrow_screen(site: Path, chromium: Any, name: str) -> None:
     page = chromium.new_page(viewport={"width": 390, "height": 800})

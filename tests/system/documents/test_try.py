@@ -147,26 +147,73 @@ def test_first_picture_is_there_within_five_seconds(chromium: Any, address: str)
     assert min(took_s) < SOONEST_S
 
 
+def entered(page: Any, line: str) -> list[str]:
+    """Enters a line in the terminal; returns what it says, after ``WATCH``."""
+    before = page.evaluate("lines.length")
+    page.fill("#line", line)
+    page.press("#line", "Enter")
+    page.wait_for_selector("#line[aria-disabled=false]")
+    return list(page.evaluate("lines"))[before:]
+
+
+SESSION = """
+ExtendedIdentification
+CaptureAndProcess
+wait 30
+SupplyReport
+wait 400
+SupplyReport
+wait 2000
+PhaseTimes
+TogglePowerSW
+wait 300
+SupplyReport
+TogglePowerSW
+wait 50
+SetFrameRate 20
+Exposure 100
+SelectCameraRegister 0x851d
+wait 50
+CameraRegister
+CaptureImage
+wait 700
+CameraTiming
+SaveConfig
+wait 200
+Trigger
+wait 4400
+LoopStatus
+AttitudeQuaternion
+StopLoop
+MCUReset
+wait 50
+ExtendedIdentification
+LogStatus
+ErrorFlags
+"""
+
+
+def test_session_at_the_terminal_is_that_of_the_emulator(page: Any, folder: Path) -> None:
+    page.evaluate(WATCH)
+    for line in SESSION.split("\n")[1:-1]:
+        entered(page, line)
+        assert page.inner_text("#status").startswith("Ready")
+    lines = page.evaluate("lines")
+    told, heard = frames(lines, "from"), frames(lines, "to")
+    assert len(told) == len(heard) > 20
+    assert told == emulated(folder / "sky-00.png", heard)
+
+
 def test_terminal_sends_names_parameters_and_bytes(page: Any) -> None:
     page.evaluate(WATCH)
-
-    def entered(line: str) -> list[str]:
-        page.evaluate("lines.length = 0")
-        page.fill("#line", line)
-        page.press("#line", "Enter")
-        page.wait_for_selector("#line[aria-disabled=false]")
-        return list(page.evaluate("lines"))
-
-    assert entered("setDetectionThresholds 31 30")[1].endswith("1f 7f 00 1f ff")
-    assert entered("detectionThresholdValues")[-2:] == [
-        "  DetectionThreshold 31",
-        "  StarThreshold 30",
-    ]
-    assert entered("1f 7f 63 1f ff")[1].endswith("1f 7f 01 1f ff")
-    assert entered("1f 7f ee 1f ff")[1] == "no answer"
-    entered("<img src=x>")
+    assert entered(page, "setDetectionThresholds 31 30")[1].endswith("1f 7f 00 1f ff")
+    shown = entered(page, "detectionThresholdValues")[-2:]
+    assert shown == ["  DetectionThreshold 31", "  StarThreshold 30"]
+    assert entered(page, "1f 7f 63 1f ff")[1].endswith("1f 7f 01 1f ff")
+    assert entered(page, "1f 7f ee 1f ff")[1] == "no answer"
+    entered(page, "<img src=x>")
     assert page.inner_text("#status") == "There is no message <img."
-    entered("setDetectionThresholds 31")
+    entered(page, "setDetectionThresholds 31")
     assert "DetectionThreshold, StarThreshold" in page.inner_text("#status")
 
 
