@@ -20,10 +20,11 @@ export class Device {
     board.run(BOOT_MS);
   }
 
-  message(name) {
-    const found = this.#messages.find((one) => one.name.toLowerCase() === name.toLowerCase());
-    if (!found) throw new Error(`There is no message ${name}.`);
-    return found;
+  // With parameters, the telecommand of that name, else the telemetry frame if there is one.
+  message(name, parameters = 0) {
+    const found = this.#messages.filter((one) => one.name.toLowerCase() === name.toLowerCase());
+    if (!found.length) throw new Error(`There is no message ${name}.`);
+    return found.find((one) => one.kind === (parameters ? "telecommand" : "telemetry")) ?? found[0];
   }
 
   // Sends bytes; returns the payload of the next frame, null without an answer.

@@ -123,13 +123,16 @@ const reported = ({ ms, sent, bytes }) =>
 async function enter(device, line) {
   const [name, ...values] = line.trim().split(/[\s,]+/);
   if (!name) return;
-  if (name === "wait") return device.wait(Math.min(10_000, Number(values[0]) || 0));
+  if (name === "wait") {
+    if (!(values[0] >= 1 && values[0] <= 60_000)) throw new Error("wait takes 1 to 60000 ms.");
+    return device.wait(Math.round(values[0]));
+  }
   const bytes = line.trim().split(/\s+/);
   if (bytes.every((one) => /^[0-9a-f]{2}$/i.test(one))) {
     if (!(await device.exchange(bytes.map((one) => parseInt(one, 16))))) log("no answer");
     return;
   }
-  const message = device.message(name);
+  const message = device.message(name, values.length);
   const telemetry = message.kind === "telemetry";
   const payload = await device.exchange(framed([message.id, ...(telemetry ? [] : encoded(message, values))]));
   if (!payload) log("no answer");

@@ -211,6 +211,10 @@ def test_terminal_sends_names_parameters_and_bytes(page: Any) -> None:
     assert shown == ["  DetectionThreshold 31", "  StarThreshold 30"]
     assert entered(page, "1f 7f 63 1f ff")[1].endswith("1f 7f 01 1f ff")
     assert entered(page, "1f 7f ee 1f ff")[1] == "no answer"
+    assert entered(page, "Exposure 100")[1].endswith("1f 7f 00 1f ff")
+    assert entered(page, "Exposure")[-1] == "  exposure 100"  # a frame has the same name
+    entered(page, "wait 0")
+    assert page.inner_text("#status") == "wait takes 1 to 60000 ms."
     entered(page, "<img src=x>")
     assert page.inner_text("#status") == "There is no message <img."
     entered(page, "setDetectionThresholds 31")
