@@ -4,7 +4,7 @@
 import { Deframer, decoded, framed } from "./serial.js";
 
 const BOOT_MS = 10, ANSWER_MS = 1000, PROCESSED_MS = 10_000, POLL_MS = 20;
-const SLICE_MS = 12; // of wall time; then the browser draws
+const SLICE_MS = 25; // of wall time; then the browser draws
 
 export class Device {
   #board;

@@ -147,7 +147,9 @@ async function start() {
     load("messages.json", "json"),
     load("skies.json", "json"),
   ]);
-  for (const sky of skies) sky.pixels = await pixels(await load(sky.file, "arrayBuffer"));
+  await Promise.all(
+    skies.map(async (sky) => (sky.pixels = await pixels(await load(sky.file, "arrayBuffer")))),
+  );
   const module = await WebAssembly.compile(wasm);
   let sky, board, device, busy = false;
   const powerUp = async () => {

@@ -19,7 +19,8 @@ from docs import make_try
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("try")]
 
 LARGEST = 1_500_000
-SOONEST_S = 5.0
+MOST_S = 2.5
+"""Processor time to the first picture; users wait at most twice that, on slower machines too."""
 SKIES = 10
 SOON_MS = 120_000
 
@@ -135,16 +136,19 @@ def test_files_are_small(folder: Path) -> None:
     assert sum(file.stat().st_size for file in folder.iterdir()) < LARGEST
 
 
-def test_first_picture_is_there_within_five_seconds(chromium: Any, address: str) -> None:
-    took_s = list[float]()
-    while not took_s or (min(took_s) > SOONEST_S and len(took_s) < 3):  # others use the machine too
-        page = chromium.new_context().new_page()
-        page.goto(address)
-        page.wait_for_selector("#status >> text=/^Ready/")
-        take(page)
-        took_s.append(page.evaluate("performance.now()") / 1000)
-        page.context.close()
-    assert min(took_s) < SOONEST_S
+def test_first_picture_comes_soon(chromium: Any, address: str) -> None:
+    page = chromium.new_context().new_page()
+    page.set_default_timeout(SOON_MS)
+    session = page.context.new_cdp_session(page)
+    session.send("Performance.enable")
+    page.goto(address)
+    page.wait_for_selector("#status >> text=/^Ready/")
+    take(page)
+    metrics = {
+        one["name"]: one["value"] for one in session.send("Performance.getMetrics")["metrics"]
+    }
+    page.context.close()
+    assert 0.1 < metrics["ProcessTime"] < MOST_S
 
 
 def entered(page: Any, line: str) -> list[str]:
