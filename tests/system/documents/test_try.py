@@ -20,7 +20,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("try")]
 
 LARGEST = 1_500_000
 MOST_S = 2.5
-"""Processor time to the first picture; users wait at most twice that, on slower machines too."""
+"""Processor time to the first picture in s: half of the 5 s in which users must have it."""
 SKIES = 10
 SOON_MS = 120_000
 
