@@ -12,7 +12,7 @@ from math import atan, cos, hypot, pi, radians, tan
 import numpy as np
 
 from cubestack.firmware_model.aramis.arrays import Floats, Mask
-from cubestack.firmware_model.attitude.lens_doubt import UNIT_PX, LensErrors
+from cubestack.firmware_model.attitude.lens_models import UNIT_PX, LensErrors
 from cubestack.firmware_model.interface.cameras.mt9m001 import COLUMNS, PIXEL_PITCH_MM, ROWS
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.values import DeclaredValues, flag, number, whole

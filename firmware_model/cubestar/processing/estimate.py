@@ -20,7 +20,8 @@ from cubestack.firmware_model.attitude.geometry import (
     undistort,
     unit_vectors,
 )
-from cubestack.firmware_model.attitude.lens_doubt import LensErrors, judge_lens
+from cubestack.firmware_model.attitude.lens_doubt import judge_lens
+from cubestack.firmware_model.attitude.lens_models import LensErrors
 from cubestack.firmware_model.attitude.quest import quest
 from cubestack.firmware_model.attitude.robust_fit import robust_fit
 from cubestack.firmware_model.cubestar.detection.contract import Detection

@@ -6,12 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.attitude.lens_doubt import (
-    LARGEST_SIGMA_RAD,
-    LensErrors,
-    LensVerdict,
-    judge_lens,
-)
+from cubestack.firmware_model.attitude.lens_doubt import LARGEST_SIGMA_RAD, LensVerdict, judge_lens
+from cubestack.firmware_model.attitude.lens_models import LensErrors
 from cubestack.firmware_model.attitude.quest import dcm
 from cubestack.firmware_model.attitude.robust_fit import robust_fit
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
@@ -53,7 +49,7 @@ def judged(
     rng = np.random.default_rng(seed)
     true = rng.uniform((0, 0), (1023, 511), (stars, 2))
     attitude, focal_px = turned(seed), FOCAL_PX * longer
-    reference = (rays(true, longer) @ attitude).astype(np.float32)
+    reference = (rays(true.astype(np.float32), longer) @ attitude).astype(np.float32)
     away = true - MIDDLE
     seen = true + away @ np.array(linear).T + np.array(shift)
     seen += cubic * away * np.sum(away**2, axis=1, keepdims=True) / 512**3
