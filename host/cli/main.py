@@ -13,8 +13,8 @@ from contextlib import contextmanager
 from importlib.metadata import version
 from io import TextIOWrapper
 
-from cubestack.firmware_model.formats.untrusted import shown, shown_lines
-from cubestack.host.cli.arguments import Parser
+from cubestack.firmware_model.formats.untrusted import shown_lines
+from cubestack.host.cli.arguments import Parser, one_line
 from cubestack.host.cli.commands import BUILT_IN, Listed, commands, reports, with_headings
 from cubestack.host.devices.registry import device_names
 from cubestack.host.terminal import hush, say
@@ -142,7 +142,7 @@ def main(
 
 def _fail(command: str, text: str, status: int = FAILED) -> int:
     """Print an error as one line, whatever names are in it; returns the exit status."""
-    print(f"cubestack {command}: {shown(text)}", file=sys.stderr)
+    print(f"cubestack {command}: {one_line(text)}", file=sys.stderr)
     return status
 
 

@@ -28,6 +28,7 @@ def test_cases_cover_every_argument(tmp_path: Path) -> None:
         (1, "cubestack measure: one\nand more\n"),
         (99, "cubestack measure: x\n"),
         (2, "x: no such file\n"),
+        (2, f"cubestack measure: {'x' * 2000}: no such file\n"),
     ],
 )
 def test_bad_ends_are_noticed(status: int, said: str) -> None:

@@ -43,6 +43,7 @@ TEXTS = {
     "letter": "\N{SNOWMAN}",
     "surrogate": "\udcff",
     "line": "a\nb",
+    "long": "k" * 50_000,
 }
 
 GIVEN = {
@@ -172,6 +173,9 @@ PYTHON = re.compile(
 
 ESCAPED = 99
 
+LONGEST = 1500
+"""Most characters of an error."""
+
 
 def outcome(
     words: tuple[str, ...], folder: Path, accepted_s: float = ACCEPTED_S
@@ -234,6 +238,8 @@ def problem(status: int | None, said: str) -> str:
         return ""
     if status not in (1, 2):
         return f"status {status}"
+    if len(said) > LONGEST:
+        return f"{len(said)} characters"
     return "" if len(lines) == 1 and lines[0].startswith("cubestack") else f"{len(lines)} lines"
 
 

@@ -1,3 +1,4 @@
+import contextlib
 import http.client
 import json
 import resource
@@ -60,6 +61,19 @@ def test_address_with_token_sets_a_cookie(controlled: Controlled) -> None:
 def test_websocket_needs_token_and_origin(controlled: Controlled, headers: dict[str, str]) -> None:
     with pytest.raises(InvalidStatus, match="403"):
         listening(controlled.serving, "/events", headers)
+
+
+def test_upgrade_that_is_no_websocket_ends_its_connection(controlled: Controlled) -> None:
+    """Its header is longer than the parser of WebSockets takes; nobody answers."""
+    with socket.create_connection(controlled.serving.address, SOON_S) as raw:
+        raw.sendall(
+            b"GET /events HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\n"
+            b"Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+            b"Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n"
+            b"Sec-WebSocket-Protocol: " + b"a," * 5000 + b"\r\n\r\n"
+        )
+        with contextlib.suppress(ConnectionResetError):
+            assert raw.recv(1) == b""
 
 
 def test_websocket_rejects_messages_above_1_mib(controlled: Controlled) -> None:
