@@ -16,7 +16,6 @@ from cubestack.firmware_model.formats.untrusted import LARGEST_PICTURE, read_byt
 from cubestack.firmware_model.values import DeclaredValues, positive, vector, whole
 
 FORMATS = ("PNG", "JPEG", "TIFF")
-ACCEPTED = (*FORMATS, "FITS")
 DEPTHS = (8, 10, 12, 14, 16)
 """Bits that a file of 16 bits may use: a camera's converter often has fewer."""
 
@@ -103,12 +102,8 @@ def decode_picture(content: bytes, name: str) -> NDArray[np.uint8]:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the size is checked here
-            image = Image.open(BytesIO(content))
+            image = Image.open(BytesIO(content), formats=FORMATS)
             with image:
-                if image.format not in FORMATS:
-                    raise SceneError(
-                        f"{name} is a {image.format} picture; accepted are {', '.join(ACCEPTED)}"
-                    )
                 if image.width * image.height > MOST_PIXELS:
                     raise SceneError(
                         f"{name} has {image.width} x {image.height} pixels; accepted are "
@@ -119,7 +114,8 @@ def decode_picture(content: bytes, name: str) -> NDArray[np.uint8]:
     except SceneError:
         raise
     except UnidentifiedImageError:
-        raise SceneError(f"{name} is not a picture; accepted are {', '.join(ACCEPTED)}") from None
+        accepted = f"{', '.join(FORMATS)} and FITS"
+        raise SceneError(f"{name} is not a picture that is accepted: {accepted}") from None
     except Exception as error:  # damaged data can cause any error in Pillow's decoders
         raise SceneError(f"{name} can not be read: {shown(str(error))}") from None
     pixels.flags.writeable = False

@@ -148,6 +148,14 @@ def _picture(kind: str, mode: str) -> bytes:
     return stream.getvalue()
 
 
+def _fits(bits: int) -> bytes:
+    sizes = {"BITPIX": bits, "NAXIS": 2, "NAXIS1": 8, "NAXIS2": 8, "BZERO": 32768}
+    cards = ["SIMPLE  =                    T"]
+    cards += [f"{name:<8}= {value:>20}" for name, value in sizes.items()]
+    head = "".join(card.ljust(80) for card in (*cards, "END")).ljust(2880).encode()
+    return head + bytes(64 * abs(bits) // 8).ljust(2880, b"\0")
+
+
 def _hex(data: bytes, address: int) -> bytes:
     records = [b"\x00" * 0]
     for at in range(0, len(data), 16):
@@ -225,6 +233,10 @@ READERS: dict[str, Reader] = {
     "picture": Reader(
         lambda folder: load_picture(folder / FILE),
         (_picture("PNG", "L"), _picture("JPEG", "RGB"), _picture("TIFF", "L")),
+    ),
+    "FITS": Reader(
+        lambda folder: load_picture(folder / FILE),
+        (_fits(16), _fits(-64), _fits(8)[:2880] + _fits(8)),
     ),
     "capture": Reader(
         lambda folder: read_capture(folder / FILE),
