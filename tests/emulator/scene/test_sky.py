@@ -163,6 +163,17 @@ def test_damaged_image_file_raises_scene_error(tmp_path: Path, values: np.ndarra
         load_picture(tmp_path / "a.png")
 
 
+def test_pictures_of_many_pixels_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By what the file's head says, before its pixels take memory."""
+    Image.new("1", (8000, 7000)).save(tmp_path / "a.png")
+    words = r"^a\.png has 8000 x 7000 pixels; accepted are 50 million at most$"
+    monkeypatch.setattr(Image.Image, "convert", None)
+    with pytest.raises(SceneError, match=words):
+        load_picture(tmp_path / "a.png")
+
+
 def test_pictures_larger_than_pillow_warns_of_are_read_up_to_what_it_permits(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -106,10 +106,21 @@ def test_rejects_images_smaller_than_the_frame(
 
 def test_rejects_other_image_formats(run: Run, tmp_path: Path) -> None:
     picture = dark_picture(tmp_path / "sky.gif")
-    check_one_line(run("measure", "cubestar", "--image", picture), "GIF", "PNG, JPEG, TIFF")
+    words = "sky.gif is not a picture that is accepted", "PNG, JPEG, TIFF"
+    check_one_line(run("measure", "cubestar", "--image", picture), *words)
     picture.write_text("stars")
-    check_one_line(
-        run("measure", "cubestar", "--image", picture), "not a picture", "PNG, JPEG, TIFF"
+    check_one_line(run("measure", "cubestar", "--image", picture), *words)
+
+
+def test_lack_of_memory_is_one_line(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    def exhaust(*_: object) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr("cubestack.host.cli.measure.run_experiment", exhaust)
+    done = run("measure", "cubestar")
+    assert (done.code, done.line) == (
+        FAILED,
+        "cubestack measure: there is not enough memory for this",
     )
 
 

@@ -151,7 +151,13 @@ def test_shown_frames_are_read_repeatedly(served: Serving) -> None:
         assert json.loads(socket.recv(SOON_S))["link"]["sent"] > told["link"]["sent"]
 
 
-@pytest.mark.parametrize("nonsense", ["[]", "{", '{"every_s": "often"}', '{"show": 3}'])
+@pytest.mark.parametrize(
+    "nonsense",
+    [
+        *("[]", "{", '{"every_s": "often"}', '{"every_s": NaN}', '{"every_s": Infinity}'),
+        *('{"every_s": ' + "9" * 400 + "}", '{"show": 3}', '{"show": ["\\ud800"]}', "[" * 100),
+    ],
+)
 def test_invalid_message_closes_the_websocket(served: Serving, nonsense: str) -> None:
     with listening(served, "/targets/0/live") as socket:
         socket.send(nonsense)

@@ -75,6 +75,18 @@ def test_jobs_are_drawn_as_workers_become_free() -> None:
         assert len(asked) <= done + 2 * AHEAD
 
 
+def test_workers_import_nothing_from_the_current_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Before it has this process's path, a new interpreter imports pickle and others."""
+    mark = tmp_path / "ran"
+    for name in ("pickle", "signal", "tempfile", "cubestack", "multiprocessing"):
+        (tmp_path / f"{name}.py").write_text(f"open({str(mark)!r}, 'w').close()\nraise SystemExit")
+    monkeypatch.chdir(tmp_path)
+    assert sorted(performed(square, range(3), 2)) == [(0, 0), (1, 1), (2, 4)]
+    assert not mark.exists()
+
+
 def test_error_of_a_job_is_raised() -> None:
     with pytest.raises(ValueError, match=r"not \d"):
         list(performed(fail, range(4), 2))
