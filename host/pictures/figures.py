@@ -72,7 +72,9 @@ def rate_curves(
     if not numbers:
         names = [str(place) for place in places]
         crowded = sum(map(len, names)) > MOST_LETTERS
-        side = {"rotation": 30, "ha": "right", "rotation_mode": "anchor"} if crowded else {}
+        side: dict[str, Any] = (
+            {"rotation": 30, "ha": "right", "rotation_mode": "anchor"} if crowded else {}
+        )
         panel.set_xticks(at, names, **side)
     panel.set(xlabel=axis, ylabel="% of results, with 95 % limits", ylim=(-4, 104))
     panel.grid(alpha=0.3)
