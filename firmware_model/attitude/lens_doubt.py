@@ -47,7 +47,7 @@ LARGEST_SIGMA_RAD = 5.8e-4
 
 CONTRADICTED = 100.0  #: spread with another focal length from which on nothing is known
 WON = 0.9  #: probability from which on another lens is believed
-ODDS = 20.0  #: of another principal point, below which the boresight stays as described
+ODDS = 1000.0  #: of another principal point, below which the boresight stays as described
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,7 +28,7 @@ from cubestack.firmware_model.mcu.costs import Meter
 
 Rays = Callable[[Floats], Floats]  #: unit vectors (n, 3) of pixels (n, 2)
 
-EXPLAINED = 1.5  #: spread up to which nothing is left to explain,
+EXPLAINED = 1.1  #: spread up to which nothing is left to explain,
 TESTED = 1.25  #: if there are this many coordinates of stars per fitted parameter
 COMMON = 4.0  #: further observations that one star's unexplained error makes worthless (chosen)
 UNEXPLAINED = 3.0  #: spread from which on errors count as unexplained
