@@ -6,7 +6,7 @@ that of the module with the part's table.
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 from cubestack.firmware_model.mcu.costs import Cost
@@ -21,6 +21,8 @@ class CompiledCosts:
     simulator: str  #: name, version and the part
     operations: Mapping[str, float]  #: cycles by name
     routines: Mapping[str, float]  #: cycles of a program's routines, each on usual operands
+    #: mean number of the library's operations in each of its functions
+    calls: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     @property
     def source(self) -> str:

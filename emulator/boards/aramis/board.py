@@ -34,7 +34,7 @@ from cubestack.firmware_model.interface.aramis import IMAGE_BYTES, INTERFACE, Re
 from cubestack.firmware_model.interface.aramis.codes import MeasurementOutcome, SensorState
 from cubestack.firmware_model.interface.aramis.switches import DEFAULT_SWITCHES, AramisSwitches
 from cubestack.firmware_model.interface.cameras.mt9m001 import COLUMNS, REGISTERS, ROWS
-from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
+from cubestack.firmware_model.mcu.blackfin import blackfin_bf533
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.memory import FlashStore
 
@@ -112,7 +112,7 @@ class AramisBoard(Board):
         self._hardware = _Blackfin(self)
         self._frames: deque[RollingShutter] = deque(maxlen=REMEMBERED)
         self._frame = 0
-        meter = Meter(BLACKFIN_BF533)
+        meter = Meter(blackfin_bf533(library=switches.library))
         offer_firmware_loops()
 
         def boot(cause: int) -> AramisProgram:

@@ -66,6 +66,16 @@ class AramisSwitches(Switches):
         "whole image; each place has its own, stars are recognised by their shape, and twice "
         "MaxStars are kept",
     )
+    library: str = switch(
+        "costs of the processor's floating-point library",
+        "vendor",
+        "vendor",
+        "compiled",
+        source="chapters 7 and 8: programs in MATLAB, no compiler for the part",
+        reason="vendor is Analog Devices' library as published, with functions composed of its "
+        "operations; compiled is gcc's in C, the slowest; every time is between the two",
+        hardware=True,
+    )
 
 
 DEFAULT_SWITCHES = AramisSwitches()

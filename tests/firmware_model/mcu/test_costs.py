@@ -156,10 +156,26 @@ def test_flash_read_cost_follows_the_clock_frequency() -> None:
     assert blackfin_bf533(clock_hz=300_000_000).operations["flash_read"].cycles == 5 * 7
 
 
-def test_blackfin_costs_are_published_or_assumed_with_a_source() -> None:
-    tags = {cost.provenance for cost in BLACKFIN_BF533.operations.values()}
-    assert tags == {"published", "assumed"}
-    assert all(cost.source for cost in BLACKFIN_BF533.operations.values())
+@pytest.mark.parametrize("library", ["vendor", "compiled"])
+def test_blackfin_costs_are_not_fitted_and_at_most_a_third_is_assumed(library: str) -> None:
+    table = blackfin_bf533(library=library)
+    tags = Counter(cost.provenance for cost in table.operations.values())
+    assert tags["fitted"] == 0
+    assert 3 * tags["assumed"] <= tags.total()
+    with pytest.raises(ValueError, match="library must be vendor or compiled, not 'mine'"):
+        blackfin_bf533(library="mine")
+
+
+def test_vendor_functions_are_the_compiled_ones_with_the_vendors_operations() -> None:
+    compiled = compiled_costs("blackfin")
+    vendor, gcc = BLACKFIN_BF533.cycles, blackfin_bf533(library="compiled").cycles
+    for name, calls in compiled.calls.items():
+        rest = compiled.operations[name] - sum(
+            count * compiled.operations[part] for part, count in calls.items()
+        )
+        expected = rest + sum(count * vendor[part] for part, count in calls.items())
+        assert vendor[name] == pytest.approx(expected, abs=0.51)
+        assert 0 < rest <= vendor[name] <= gcc[name]
 
 
 def test_blackfin_costs_include_every_float_operation_of_the_cortex_m3() -> None:
