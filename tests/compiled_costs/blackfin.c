@@ -68,6 +68,7 @@ __attribute__((interrupt_handler)) void frame_interrupted(void) {
 /* Check byte of 64 data bits by table, and its comparison. */
 __attribute__((noinline)) static int decode(const uint8_t *coded) {
     uint8_t check = coded[8];
+#pragma GCC unroll 8
     for (int place = 0; place < 8; place++) {
         check ^= checks[256 * place + coded[place]];
     }

@@ -23,7 +23,7 @@ from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Routine, pause
 HEADER = struct.Struct("<4sI")
 MAGIC = b"AFLS"
 
-SLICE_WORDS = 8192  #: coded words per step of a load: 3 ms, after which other jobs can run
+SLICE_WORDS = 8192  #: coded words per step of a load: 5 ms, after which other jobs can run
 
 #: Erasing a sector and programming 16 bits of the M29W320D: typical values of its data sheet.
 ERASE_US, PROGRAM_WORD_US = 800_000, 10

@@ -49,10 +49,10 @@ def test_catalogue_is_loaded_as_written(desk: Desk) -> None:
     assert store.length == len(desk.image)
 
 
-def test_catalogue_load_takes_less_than_twice_the_flash_read_time(desk: Desk) -> None:
+def test_catalogue_load_takes_less_than_2_5_times_the_flash_read_time(desk: Desk) -> None:
     desk.load()
     flash_us = len(desk.coded) / 2 * 0.070
-    assert flash_us < desk.store.load_us < 2 * flash_us
+    assert flash_us < desk.store.load_us < 2.5 * flash_us
     assert desk.store.loaded_us == desk.unit.now_us
 
 
