@@ -36,6 +36,14 @@ export class Answer {
     this.truth.textContent = this.emulated ? compared : "The truth is known for emulated devices only.";
   }
 
+  // Time went back, and what was read is of a time that has not come.
+  forget() {
+    this.summary.className = "";
+    this.summary.textContent = "Time went back. Results are read again when it runs.";
+    for (const cell of this.angles.querySelectorAll("td")) cell.textContent = "–";
+    this.truth.textContent = "Results are compared with the truth.";
+  }
+
   // `set`: elements of the flags that are set.
   showFlags(set) {
     this.flags.replaceChildren(...set);

@@ -155,6 +155,7 @@ function select(number) {
   const lamps = new Lamps(at("health"), about, (names) => show("lamps", names), (set) => answer.showFlags(set));
   const results = new Results(at("results"), about, path, report, (on) => subscribe({ results: on }));
   const telemetry = new Telemetry(at("telemetry"), about, (names) => show("telemetry", names));
+  let latest = 0; // virtual time of the last message
   live = listen(
     `${path}/live`,
     (message) => {
@@ -170,6 +171,11 @@ function select(number) {
       transfer.update(message.transfer);
       playback.update(message.playback);
       const { truth, time_s } = message.emulation ?? {};
+      if (time_s < latest) {
+        lamps.update({});
+        answer.forget();
+      }
+      latest = time_s ?? 0;
       if (message.values) {
         telemetry.update(message.values);
         lamps.update(message.values);

@@ -175,6 +175,25 @@ def test_back_returns_to_a_snapshot(page: Any) -> None:
     assert "Threshold1: 7" in told
 
 
+@pytest.mark.slow
+def test_results_and_flags_of_a_time_that_has_not_come_are_cleared(page: Any) -> None:
+    page.click("#snapshot")
+    page.wait_for_selector("#lines li.good >> text=snapshot")
+    page.click("#take")
+    page.wait_for_selector("#summary >> text=/stars identified/")
+    page.wait_for_selector("#flags-set li.notice")
+    page.click("#back")
+    page.wait_for_selector("#summary >> text=/Time went back/")
+    assert page.locator("#flags-set li").count() == 0
+    assert set(page.locator("#angles td").all_inner_texts()) == {"\N{EN DASH}"}
+    page.wait_for_selector("#pause[aria-pressed=true]")
+    page.click("#pause")
+    page.wait_for_selector("#pause[aria-pressed=false]")
+    page.wait_for_function(
+        "() => !document.querySelector('#summary').textContent.includes('Time went back')"
+    )
+
+
 def test_fault_is_injected_and_logged(page: Any) -> None:
     faults = page.locator("#fault option").all_inner_texts()
     reset = next(fault for fault in faults if fault.startswith("processor-reset "))
