@@ -38,25 +38,37 @@ def largest_file(count: int) -> Iterator[None]:
 def test_emulation_goes_on_and_the_rest_replays(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """The device answers as before; its recording has what came before the disk was full."""
-    path = tmp_path / "some.rec"
+    assert fill_disk(tmp_path / "some.rec", 1500) > 0
+    assert "it ends here, and the emulation goes on" in caplog.text
+
+
+@pytest.mark.slow
+def test_disk_may_be_full_at_any_moment(tmp_path: Path) -> None:
+    rng = random.Random(9)
+    for number in range(MOMENTS):
+        fill_disk(tmp_path / f"{number}.rec", rng.randrange(1000, 5000))
+
+
+def fill_disk(path: Path, room: int) -> int:
+    """The device answers as before while its recording reaches ``room`` bytes; what came before
+    replays. Returns the number of recorded events."""
     with Outputs() as stack:
         device = stack.enter_context(open_device("cubesense", seed=3, engine="python"))
         recorder = start_recorder(device, create_record(path, stack), emulated_setup(3, None))
         stack.callback(recorder.close)
         stack.keep()
         client = device.client.client
-        with largest_file(1500):
-            for _ in range(20):
+        with largest_file(room):
+            for _ in range(30):
                 assert client.telemetry("Identification")
                 recorder.flush()
-    assert "it ends here, and the emulation goes on" in caplog.text
+    assert path.stat().st_size <= room
     found = load_recording(path)
-    assert found.events
     again = open_device("cubesense", seed=3, engine="python")
     with again:
         replay = Replay(found, again.board.kernel, again.board.uarts, again.board.i2c_bus)
         assert replay.run(again.device.interface) == []
+    return len(found.events)
 
 
 def test_disk_that_is_full_at_the_start_loses_no_earlier_file(tmp_path: Path) -> None:
