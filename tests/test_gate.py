@@ -33,6 +33,7 @@ OWN = {
     "emulator/rtl/cxxrtl/build.py": "headers of a package",
     "emulator/scene/hipparcos.py": "a package's file whose hash it checks",
     "emulator/scene/picture.py": "bytes that the gate has read; any error of Pillow is caught",
+    "firmware_model/mcu/compiled.py": "our package",
     "firmware_model/mcu/cortex_m3.py": "our package",
     "firmware_model/reference/image.py": "our package",
     "host/api/sensor.py": "our sources",
