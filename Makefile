@@ -30,7 +30,7 @@ DOCUMENTS ?=
 # Nothing here is made by a built-in rule: one would make "setup" of setup.sh.
 MAKEFLAGS += --no-builtin-rules
 
-.PHONY: help venv run docs test fuzz test-all test-hdl test-clients test-suites pasted firmware mutants lint wheels bench bench-engines clean
+.PHONY: help venv run docs test fuzz test-all test-hdl test-clients test-suites pasted firmware mutants lint wheels bench bench-engines fidelity clean
 
 help:
 	@echo "make run       set up, then boot the sensors, measure over their serial ports, and draw what they saw"
@@ -46,6 +46,7 @@ help:
 	@echo "make docs      set up, then build the documents as a site in out/site"
 	@echo "make lint      ruff, mypy, and a check of the prose"
 	@echo "make wheels    set up, then build the source distribution and the wheels of all platforms into dist/"
+	@echo "make fidelity  set up, then measure the figures of the documents again, within 20 minutes on two idle cores"
 	@echo "make bench     measure the cost of the hot paths"
 	@echo "make bench-engines  compare the simulators that can run the gateware"
 	@echo "make clean     remove .venv, out and caches"
@@ -116,6 +117,12 @@ test-suites: .venv/ready-dev
 	@tests/emulator/iss/suites/install.sh
 	@CUBESTACK_SUITES=$(EVERY) CUBESTACK_SUITES_SEED=$(SEED) $(PYTEST) -n 0 -m "slow or not slow" -rs -s \
 		tests/emulator/iss/suites
+
+# What `make fidelity` renews, for instance FIGURES="cubesense --stale"; all when it is empty.
+FIGURES ?=
+
+fidelity: .venv/ready-dev
+	@$(BIN)/cubestack fidelity $(FIGURES) --write
 
 bench: .venv/ready-run
 	@$(BIN)/cubestack bench

@@ -10,6 +10,8 @@ from concurrent.futures import (
     Executor,
     Future,
     ProcessPoolExecutor,
+    ThreadPoolExecutor,
+    as_completed,
     wait,
 )
 from concurrent.futures.process import BrokenProcessPool
@@ -84,6 +86,31 @@ def performed(
             rest = chain(running.values(), rest)
 
 
+def performed_afresh(
+    function: Callable[[Job], Done], jobs: Iterable[Job], workers: int
+) -> Iterator[tuple[Job, Done]]:
+    """The same, with a new process for each job, in which nothing was computed before."""
+    listed = list(jobs)
+    with _safe_path(), ThreadPoolExecutor(workers) as threads:
+        running = {threads.submit(_alone, function, job): job for job in listed}
+        try:
+            for future in as_completed(running):
+                yield running[future], future.result()
+        finally:
+            for future in running:
+                future.cancel()
+
+
+def _alone(function: Callable[[Job], Done], job: Job) -> Done:
+    for _ in range(DEATHS + 1):
+        try:
+            with ProcessPoolExecutor(1, get_context("spawn"), _begin) as pool:
+                return pool.submit(function, job).result()
+        except BrokenProcessPool as error:
+            told = error
+    raise WorkersError(f"the worker of {job} went away: {told}")
+
+
 def _handed_out(
     function: Callable[[Job], Done],
     jobs: Iterator[Job],
@@ -129,15 +156,23 @@ def _result(future: Future[Done]) -> Done:
 def _processes(workers: int) -> Iterator[tuple[Executor, int]]:
     # A process of its own each: forking one that shows progress in a thread can hang.
     pool = ProcessPoolExecutor(workers, get_context("spawn"), _begin)
+    try:
+        with _safe_path():
+            yield pool, workers
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+
+
+@contextmanager
+def _safe_path() -> Iterator[None]:
     before = os.environ.get(SAFE_PATH)
     os.environ[SAFE_PATH] = "1"
     try:
-        yield pool, workers
+        yield
     finally:
         os.environ.pop(SAFE_PATH)
         if before is not None:
             os.environ[SAFE_PATH] = before
-        pool.shutdown(wait=False, cancel_futures=True)
 
 
 def _begin() -> None:

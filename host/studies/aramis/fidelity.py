@@ -21,14 +21,9 @@ from cubestack.firmware_model.interface.aramis import IMAGE_BYTES
 from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.host.experiments.aramis.measure import AramisOpener, AramisResult
-from cubestack.host.studies.fidelity.table import (
-    Fidelity,
-    Figures,
-    Trial,
-    mean,
-    measured,
-    read_tables,
-)
+from cubestack.host.studies.fidelity.table import Fidelity, read_tables
+from cubestack.host.studies.rows.estimate import average, rate
+from cubestack.host.studies.rows.trial import Figures, Trial, measured
 
 EPOCH = 2000.0  # of the thesis' catalogue
 LOOKUP_SEED = 1
@@ -38,20 +33,19 @@ STARS = 6
 
 def _attitudes(results: Sequence[AramisResult]) -> Figures:
     """Rates in percent; errors of the right ones in arcsec; mean times in ms."""
-    count = len(results)
     right = [result for result in results if result.right]
     errors = {
         axis: [3600 * abs(getattr(result, f"error_{axis}_deg")) for result in right] or [np.nan]
         for axis in ("cross", "roll")
     }
     return {
-        "right": 100 * len(right) / count,
-        "wrong": 100 * sum(r.solved and not r.right for r in results) / count,
-        "far": 100 * sum(bool(r.far) for r in results) / count,
-        "conclusive": 100 * sum(r.solved for r in results) / count,
-        "ambiguous": 100 * sum(r.outcome == "ambiguous" for r in results) / count,
-        "none": 100 * sum(r.outcome == "none" for r in results) / count,
-        "cross": mean(errors["cross"]),
+        "right": rate(r.right for r in results),
+        "wrong": rate(r.solved and not r.right for r in results),
+        "far": rate(bool(r.far) for r in results),
+        "conclusive": rate(r.solved for r in results),
+        "ambiguous": rate(r.outcome == "ambiguous" for r in results),
+        "none": rate(r.outcome == "none" for r in results),
+        "cross": average(errors["cross"]),
         "cross95": float(np.percentile(errors["cross"], 95)),
         "roll95": float(np.percentile(errors["roll"], 95)),
     }
@@ -102,14 +96,14 @@ def _lookups(_opened: AramisOpener, frames: int) -> Figures:
         pivoted = match_triple(vectors, (0, 1, 2), (3,), sigma_rad, database, None, meter, None)
         counts.append((areas, moments, len(both), len(pivoted.candidates)))
     names = ("area", "moment", "both", "pivot")
-    return dict(zip(names, map(float, np.mean(counts, axis=0)), strict=True))
+    return dict(zip(names, map(average, np.array(counts).T), strict=True))
 
 
 FIDELITY = Fidelity(
     page="fidelity-aramis.md",
     trials={
-        "lis": measured("aramis", _attitudes, 300, 3, 90),
-        "aided": measured("aramis", _attitudes, 300, 3, 90, mode="assisted", hint_error=2),
+        "lis": measured("aramis", _attitudes, 100, 3, 30),
+        "aided": measured("aramis", _attitudes, 100, 3, 30, mode="assisted", hint_error=2),
         "catalogue": Trial(_catalogue, seconds=30, profiles=False),
         "lookups": Trial(_lookups, 300, 20, 5, profiles=False),
     },

@@ -21,7 +21,9 @@ from cubestack.hdl.flow.area_report import recorded_areas
 from cubestack.host.experiments.cubesense.measure import CubeSenseOpener, SensorResult, view_of
 from cubestack.host.experiments.measure import measure
 from cubestack.host.studies.cubesense.ball import EXPERIMENT, BallOptions
-from cubestack.host.studies.fidelity.table import Fidelity, Figures, Trial, measured, read_tables
+from cubestack.host.studies.fidelity.table import Fidelity, read_tables
+from cubestack.host.studies.rows.estimate import deviation, rate_of
+from cubestack.host.studies.rows.trial import Figures, Trial, measured
 
 ALTITUDE_KM = 750.0  # of the text
 SUN_BANDS = {
@@ -56,7 +58,7 @@ def _sensor(results: Sequence[SensorResult]) -> Figures:
         "mean": error.mean(),
         "p95": np.percentile(error, 95),
         "worst": error.max(),
-        "detected": 100 * len(good) / len(results),
+        "detected": rate_of(len(good), len(results)),
         "least_edges": min((r.edges or 0) for r in good),
         "most_edges": max((r.edges or 0) for r in good),
     }
@@ -70,7 +72,8 @@ def _sensor(results: Sequence[SensorResult]) -> Figures:
     figures["sum_30"] = (inner.mean(axis=0) + axes[angle < 30].std(axis=0)).max()
     figures["sigma_ms"] = phases["total"].std()
     figures["imaging_ms"] = (phases["wait"] + phases["store"]).mean()
-    return {name: float(value) for name, value in figures.items()}
+    detected = figures["detected"]
+    return {name: float(value) for name, value in figures.items()} | {"detected": detected}
 
 
 #: Readings of the processor's speed, by the prefix of their figures.
@@ -94,9 +97,11 @@ def _times(opened: CubeSenseOpener, frames: int, **options: Any) -> Figures:
 def _ball(opened: CubeSenseOpener, frames: int) -> Figures:
     """Mean offset in each direction and largest sigma, of ``frames`` images per angle."""
     step = 5.0 if frames > 1 else 30.0
-    results = list(EXPERIMENT.run(opened, BallOptions(step=step, samples=max(2, frames))))
+    samples = max(2, frames)
+    results = list(EXPERIMENT.run(opened, BallOptions(step=step, samples=samples)))
     figures = {result.direction: result.offset_deg or np.nan for result in results}
-    return {**figures, "sigma": max(result.sigma_deg or 0.0 for result in results)}
+    largest = max(result.sigma_deg or 0.0 for result in results)
+    return {**figures, "sigma": deviation(largest, samples - 1)}
 
 
 def _scene(sensor: Camera, angle_deg: float) -> EarthSunScene:
@@ -116,7 +121,7 @@ def _scatter(
         )
         found = np.array([(one.alpha_deg, one.beta_deg) for one in results])  # type: ignore[attr-defined]
         largest = max(largest, float(found.std(axis=0).max()))
-    return {"sigma": largest}
+    return {"sigma": deviation(largest, each - 1)}
 
 
 def _power(_opened: CubeSenseOpener, _frames: int) -> Figures:
@@ -217,12 +222,16 @@ def _memory(_opened: CubeSenseOpener, _frames: int) -> Figures:
     }
 
 
+_measured = partial(
+    measured, "cubesense", _sensor, seed=2, units=10, extremes=("worst", "least", "most")
+)
+
 FIDELITY = Fidelity(
     page="fidelity-cubesense.md",
     trials={
         "ball": Trial(_ball, 10, 1, 30, "ball"),
-        "nadir": measured("cubesense", _sensor, 300, 4, 40, sensor="nadir", seed=2, units=10),
-        "sun": measured("cubesense", _sensor, 300, 6, 25, sensor="sun", seed=2, units=10),
+        "nadir": _measured(300, 4, 40, sensor="nadir"),
+        "sun": _measured(300, 6, 25, sensor="sun"),
         "nadir-time": Trial(partial(_times, sensor="nadir"), 90, 6, 15),
         "sun-time": Trial(partial(_times, sensor="sun", sun_angle=5), 90, 6, 10),
         "sun-still": Trial(partial(_scatter, sensor="sun", angles_deg=(0.0, 40.0, 80.0)), 60, 6, 8),

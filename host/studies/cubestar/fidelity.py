@@ -1,5 +1,6 @@
 """CubeStar's published figures (thesis, Stellenbosch University, 2013) and their trials."""
 
+import math
 from collections.abc import Sequence
 from functools import partial
 from typing import Any
@@ -21,15 +22,10 @@ from cubestack.host.studies.calibrate import CalibrateOptions
 from cubestack.host.studies.cubestar.calibrate import EXPERIMENT
 from cubestack.host.studies.cubestar.layouts import attitudes_of_loop
 from cubestack.host.studies.cubestar.night import night
-from cubestack.host.studies.cubestar.shots import PICTURES, field_shots, slewing_shots
-from cubestack.host.studies.fidelity.table import (
-    Fidelity,
-    Figures,
-    Trial,
-    mean,
-    measured,
-    read_tables,
-)
+from cubestack.host.studies.cubestar.shots import PICTURES, Shot, field_shots, slewing_shots
+from cubestack.host.studies.fidelity.table import Fidelity, read_tables
+from cubestack.host.studies.rows.estimate import average, rate, rate_of, resampled
+from cubestack.host.studies.rows.trial import Figures, Trial, measured
 
 RATES = (0.0635, 0.1333, 0.3, 2.0, 8.0)
 """Of section 6.2, in deg/s."""
@@ -44,22 +40,31 @@ STARS_DRAWN = 18
 def _field(opened: CubeStarOpener, frames: int, **how: Any) -> Figures:
     taken = list(field_shots(opened, frames, **how))
     return {
-        "three": 100 * mean(shot.matched - shot.wrong > 2 for shot in taken),
-        "right": 100 * mean(shot.right for shot in taken),
-        "star_wrong": 100 * mean(shot.wrong > 0 for shot in taken),
-        "off": 100 * mean(shot.valid and not shot.right for shot in taken),
-        "share": 100 * mean((shot.matched - shot.wrong) / max(shot.detected, 1) for shot in taken),
+        "three": rate(shot.matched - shot.wrong > 2 for shot in taken),
+        "right": rate(shot.right for shot in taken),
+        "star_wrong": rate(shot.wrong > 0 for shot in taken),
+        "off": rate(shot.valid and not shot.right for shot in taken),
+        "share": average(
+            100 * (shot.matched - shot.wrong) / max(shot.detected, 1) for shot in taken
+        ),
     }
 
 
 def _slew(opened: CubeStarOpener, frames: int, rate_deg_s: float) -> Figures:
     """Rates in percent of images 1 s apart, and the median error in degrees."""
     shots = list(slewing_shots(opened, frames, rate_deg_s))
+    skies = [shots[at : at + PICTURES] for at in range(0, len(shots), PICTURES)]
+    return {
+        "right": rate(shot.right for shot in shots),
+        "tracked": rate(one.tracked for at, one in enumerate(shots) if at % PICTURES),
+        "off": rate(shot.valid and not shot.right for shot in shots),
+        **resampled(_matched, skies),
+    }
+
+
+def _matched(shots: Sequence[Shot]) -> Figures:
     cross = [shot.cross_deg for shot in shots if shot.right]
     return {
-        "right": 100 * mean(shot.right for shot in shots),
-        "tracked": 100 * mean(one.tracked for at, one in enumerate(shots) if at % PICTURES),
-        "off": 100 * mean(shot.valid and not shot.right for shot in shots),
         "share": 100 * sum(s.matched for s in shots) / max(1, sum(s.detected for s in shots)),
         "cross": float(np.median(cross)) if cross else np.nan,
     }
@@ -73,8 +78,8 @@ def _attitudes(results: Sequence[AttitudeResult]) -> Figures:
     full = [result.phase_ms for result in results if result.centroids >= 20]
     both = [phases["detect"] + phases["match"] for phases in full] or [np.nan]
     return {
-        "right": 100 * len(right) / len(results),
-        "off": 100 * mean(result.solved and not result.right for result in results),
+        "right": rate(result.right for result in results),
+        "off": rate(result.solved and not result.right for result in results),
         "cross_worst": max(cross),
         "roll_worst": max(roll),
         "cross95": float(np.percentile(cross, 95)),
@@ -110,16 +115,16 @@ def _coverage(_opened: CubeStarOpener, frames: int) -> Figures:
     rng = np.random.default_rng(1)
     boresights = rng.standard_normal((frames, 3))
     boresights /= np.linalg.norm(boresights, axis=1, keepdims=True)
-    figures = {}
+    figures = dict[str, float]()
     for limit in (3.0, 3.2, 3.4, 3.5, 3.6, 3.8, 4.0, 5.0):
         vectors = load_sky(CATALOGUE_EPOCH, limit).vectors.astype(np.float32)
         cosines = boresights.astype(np.float32) @ vectors.T
         diameter = {3.5: 50.0, 5.0: 20.0}.get(limit, COVERAGE_DEG)  # figure 3.8's two examples
         seen = np.count_nonzero(cosines > np.cos(np.radians(diameter / 2)), axis=1)
         name = f"{limit:.1f}".replace(".", "_")
-        figures[f"three_{name}"] = float(100 * np.mean(seen >= 3))
-        figures[f"five_{name}"] = float(100 * np.mean(seen >= 5))
-        figures[f"mean_{name}"] = float(seen.mean())
+        figures[f"three_{name}"] = rate_of(np.count_nonzero(seen >= 3), frames)
+        figures[f"five_{name}"] = rate_of(np.count_nonzero(seen >= 5), frames)
+        figures[f"mean_{name}"] = average(seen)
     return figures
 
 
@@ -141,8 +146,7 @@ def _centroids(opened: CubeStarOpener, frames: int) -> Figures:
             found = np.array([(star.x_px, star.y_px) for star in emulated.client.stars()])
             nearest = np.linalg.norm(found[:, None] - centres, axis=2).argmin(axis=1)
             errors.append(np.abs(found - centres[nearest]).mean(axis=0))
-    x, y = np.mean(errors, axis=0)
-    return {"x": float(x), "y": float(y)}
+    return dict(zip("xy", map(average, np.array(errors).T), strict=True))
 
 
 def _loop(opened: CubeStarOpener, frames: int) -> Figures:
@@ -154,20 +158,23 @@ def _loop(opened: CubeStarOpener, frames: int) -> Figures:
         phases, volts = device.client.phase_times(), device.board.power.table.volts
     took_s = (found[-1].time_ps - begun.time_ps) / 1e12
     mw = (found[-1].charge_mas - begun.charge_mas) * volts / took_s
-    age_ms = mean(one.age_ms for one in found)
+    age_ms = math.fsum(one.age_ms for one in found) / len(found)
     return {**phases, "mw": mw, "age": age_ms, "oldest": age_ms + 1000 * took_s / len(found)}
 
 
 def _spots(opened: CubeStarOpener, frames: int) -> Figures:
     """Pixels that stars of the list cover in pictures: 5th, 50th and 95th percentile."""
-    rng, pixels = np.random.default_rng(1), list[int]()
+    rng, pixels = np.random.default_rng(1), list[list[int]]()
     with opened(None, seed=1) as device:
         for seed in range(frames):
             device.scene = SkyScene(quaternion=random_quaternion(rng), mag_limit=3.8, seed=seed)
             device.client.capture_and_process()
-            pixels += [star.pixels for star in device.client.stars()]
-    low, middle, high = np.percentile(pixels, (5, 50, 95))
-    return {"low": float(low), "middle": float(middle), "high": float(high)}
+            pixels.append([star.pixels for star in device.client.stars()])
+    return resampled(_percentiles, pixels)
+
+
+def _percentiles(pixels: Sequence[int]) -> Figures:
+    return dict(zip(("low", "middle", "high"), np.percentile(pixels, (5, 50, 95)), strict=True))
 
 
 def _calibration(opened: CubeStarOpener, frames: int) -> Figures:
@@ -248,25 +255,32 @@ def _skies() -> dict[str, Trial]:
     skies |= {f"false{n}": {"mag_limit": 3.8, "false_stars": n} for n in (1, 5, 10)}
     modes = {"lis": None, "assisted": 5.0, "exact": 0.0}
     return {
-        f"{sky}-{mode}": Trial(partial(_field, hint_deg=hint, **how), 300, 1, 25)
+        f"{sky}-{mode}": Trial(partial(_field, hint_deg=hint, **how), 100, 1, 8)
         for sky, how in skies.items()
         for mode, hint in modes.items()
         if mode != "exact" or "false_stars" not in how
     }
 
 
+_measured = partial(
+    measured,
+    "cubestar",
+    _attitudes,
+    extremes=("cross_worst", "roll_worst", "algorithms", "match", "quest"),
+)
+
 FIDELITY = Fidelity(
     page="fidelity.md",
     trials={
         **_skies(),
-        **{f"slew-{rate}": Trial(partial(_slew, rate_deg_s=rate), 100, 2, 10) for rate in RATES},
+        **{f"slew-{speed}": Trial(partial(_slew, rate_deg_s=speed), 50, 2, 5) for speed in RATES},
         "catalogue": Trial(_catalogue, seconds=2, profiles=False),
         "coverage": Trial(_coverage, 20_000, 500, 10, profiles=False),
-        "centroids": Trial(_centroids, 20, 1, 30),
-        "noiseless": measured("cubestar", _attitudes, 100, 2, 10, mag_limit=3.8, no_noise=True),
-        "built": measured("cubestar", _attitudes, 300, 2, 30, mag_limit=3.8),
-        "full": measured("cubestar", _attitudes, 60, 2, 6, mag_limit=4.5),
-        "night": Trial(night, 100, 1, 180),
+        "centroids": Trial(_centroids, 10, 1, 15),
+        "noiseless": _measured(100, mag_limit=3.8, no_noise=True),
+        "built": _measured(100, mag_limit=3.8),
+        "full": _measured(60, mag_limit=4.5),
+        "night": Trial(night, 30, 1, 50),
         "loop": Trial(_loop, 20, 2, 10),
         "calibration": Trial(
             _calibration, 20, 6, 5, "calibrate cubestar --emulated 20 --seed 0", profiles=False

@@ -28,6 +28,7 @@ from cubestack.host.clients.cubestar.client import CubeStar
 from cubestack.host.clients.cubestar.operator import LADDER
 from cubestack.host.devices.result_table import log_lines, scatter
 from cubestack.host.experiments.cubestar.measure import CubeStarOpener
+from cubestack.host.studies.rows.estimate import deviation
 
 LATITUDE_DEG, HEIGHT_M, SEEING_ARCSEC, SKY_MAG = -33.93, 120.0, 2.0, 20.0
 SIDEREAL_DEG = range(0, 360, 45)
@@ -79,9 +80,9 @@ def night(opened: CubeStarOpener, frames: int) -> dict[str, float]:
     columns = np.array(found).T
     pooled, means = np.sqrt(np.mean(columns[:4] ** 2, axis=1)), columns[4:].mean(axis=1)
     names = ("ra", "dec", "roll", "across", "fewest", "most", "valid")
-    return dict(zip(names, [*map(float, pooled), *map(float, means)], strict=True)) | {
-        "fields": len(found)
-    }
+    # Lines through the angles of each field take two degrees of freedom.
+    sigmas = [deviation(float(one), max(len(found) * (frames - 2), 1)) for one in pooled]
+    return dict(zip(names, [*sigmas, *map(float, means)], strict=True)) | {"fields": len(found)}
 
 
 def choose_threshold(client: CubeStar) -> int:

@@ -6,12 +6,15 @@ profiles, and how ours arise.
   chosen      depends on a choice that the document leaves open
   definition  the document's own formula or setting
 
-All rows take less than half an hour on two idle cores.
+The documentation stores what was measured in docs/data, with the code that it depends
+on; --write renews it, and the tables of the pages. All rows take less than twenty
+minutes on two idle cores.
 
 examples:
   cubestack fidelity --quick
   cubestack fidelity {second} --rows 'sun-*'
-  cubestack fidelity --write                 rewrite the tables of docs/fidelity*.md
+  cubestack fidelity --stale                 name the rows whose code has changed
+  cubestack fidelity --stale --write         measure those again
 """
 
 import argparse
@@ -24,6 +27,7 @@ from cubestack.firmware_model.values import whole
 from cubestack.host.cli.arguments import add_flag, add_value
 from cubestack.host.devices.registry import devices
 from cubestack.host.output import write_output
+from cubestack.host.studies.fidelity import recorded
 from cubestack.host.studies.fidelity import table as fidelity
 from cubestack.host.studies.workers import cores
 from cubestack.host.terminal import busy, say, tell
@@ -47,29 +51,29 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_flag(parser, "--json", "print one JSON object per row")
     add_flag(parser, "--markdown", "print the tables of the pages")
+    add_flag(parser, "--stale", "name rows whose code changed since; with --write, only those")
     parser.add_argument(
         "--write",
         nargs="?",
         const="docs",
         type=Path,
         metavar="FOLDER",
-        help="rewrite the tables of the pages there (default docs)",
+        help="store the measurements and rewrite the tables of the pages there (default docs)",
     )
     parser.set_defaults(known=known)
 
 
 def run(args: argparse.Namespace) -> int:
     """Measure and print; raises ValueError for unknown rows or pages."""
-    if args.write and (args.rows or args.profile or args.quick or args.frames):
-        raise ValueError(
-            "--write wants all rows whole: without --rows, --profile, --quick, --frames"
-        )
+    if args.write and (args.quick or args.frames):
+        raise ValueError("--write measures rows whole: without --quick and --frames")
     names = [args.device] if args.device else args.known
     chosen = {name: fidelity.chosen_rows(name, args.rows) for name in names}
     if not any(chosen.values()):
         raise ValueError(f"no row is like {', '.join(args.rows)}; --quick --json lists all keys")
     profiles = [args.profile] if args.profile else PROFILES
-    pages = {name: _page(args.write, name) for name in names} if args.write else {}
+    for name in names if args.write else ():
+        _check_pages(args.write, name)
     jobs = [
         job
         for name, rows in chosen.items()
@@ -77,13 +81,42 @@ def run(args: argparse.Namespace) -> int:
             name, (row for _, row in rows), profiles, quick=args.quick, frames=args.frames
         )
     ]
+    if args.stale:
+        docs = args.write or Path("docs")
+        reasons = recorded.stale(docs, names)
+        jobs = [job for job in jobs if job in reasons]
+        for job in jobs:
+            keys = ", ".join(row.key for row in recorded.rows_of(job))
+            tell(f"{job.device}, {job.key}: rows {keys}: {reasons[job]}")
+        if not args.write:
+            return 1 if jobs else 0
+    if args.write:
+        _write(args, jobs, names)
+        return 0
     workers = min(args.workers or cores(), len(jobs))
     told = _Rest(jobs, quiet=args.json)
     with busy("measuring", quiet=args.json) as shown:
         found = fidelity.run_jobs(jobs, workers, lambda job: shown(told(job), len(jobs)))
     for name, rows in chosen.items():
-        _show(args, list(fidelity.filled(name, rows, found)), pages.get(name))
+        _show(args, list(fidelity.filled(name, rows, found)))
     return 0
+
+
+def _write(args: argparse.Namespace, jobs: list[fidelity.Job], names: list[str]) -> None:
+    """Renew the jobs' measurements, then the pages."""
+    if jobs:
+        told = _Rest(jobs, quiet=False)
+        with busy("measuring") as shown:
+            workers = min(args.workers or cores(), len(jobs))
+            done = recorded.renewed(
+                args.write, jobs, workers, lambda job: shown(told(job), len(jobs))
+            )
+            for difference in done:
+                say(difference)
+    for name in names:
+        for path, text in recorded.pages(args.write, name).items():
+            write_output(path, text)
+            say(f"wrote the rows of {name} in {path}")
 
 
 class _Rest:
@@ -107,22 +140,18 @@ class _Rest:
         return self.done
 
 
-def _page(folder: Path, name: str) -> Path:
-    """A device's page; raises ValueError if a table has no place in it."""
+def _check_pages(folder: Path, name: str) -> None:
+    """Raises ValueError if a table of a device has no place in its page."""
     declared = fidelity.fidelity_of(name)
-    path: Path = folder / declared.page
-    text = path.read_text("utf-8") if path.is_file() else ""
     for table in declared.tables:
+        path: Path = folder / declared.page_of(table)
+        text = path.read_text("utf-8") if path.is_file() else ""
         if not all(mark in text for mark in fidelity.marks(table)):
             raise ValueError(f"{path} has no {fidelity.marks(table)[0].strip()}, or is not there")
-    return path
 
 
-def _show(args: argparse.Namespace, rows: list[fidelity.Measured], page: Path | None) -> None:
-    if page is not None:
-        write_output(page, fidelity.rewritten(page.read_text("utf-8"), rows))
-        say(f"wrote {len(rows)} rows to {page}")
-    elif args.json:
+def _show(args: argparse.Namespace, rows: list[fidelity.Measured]) -> None:
+    if args.json:
         for row in rows:
             print(json.dumps(row.as_dict()), flush=True)
     elif args.markdown:

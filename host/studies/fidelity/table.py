@@ -4,43 +4,24 @@ Rows share trials: one set of images yields many figures. Each trial runs once p
 in parallel.
 """
 
-import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from fnmatch import fnmatchcase
 from importlib import resources
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 from cubestack.firmware_model.interface.codec.switches import PROFILES
 from cubestack.host.devices.experiment import Result
 from cubestack.host.devices.registry import device as registered
-from cubestack.host.experiments.measure import measure
 from cubestack.host.experiments.opener import Opener
-from cubestack.host.options import option_string
+from cubestack.host.studies.rows.trial import Figures, Trial
 from cubestack.host.studies.workers import performed
 
 #: Origin of our value: it follows from the model, a constant was set to match it, it depends on a
 #: free choice, or it is the source's own formula or setting.
 Word = Literal["predicted", "fitted", "chosen", "definition"]
 WORDS: tuple[Word, ...] = get_args(Word)
-
-Figures = Mapping[str, float]
-
-
-@dataclass(frozen=True)
-class Trial:
-    """An experiment for the figures of one or more rows."""
-
-    #: figures by name, of (opened, frames); nan for a missing one. ``opened`` is an
-    #: ``experiments.opener.Opener`` of the device in one profile
-    run: Callable[[Any, int], Figures]
-    frames: int = 0  #: of a whole run; 0 if it needs none
-    quick: int = 0  #: of a quick one
-    seconds: float = 1.0  #: wall time of a whole run in one profile, roughly, on one core
-    #: arguments of `cubestack` that show it; empty if only `fidelity DEVICE --rows KEY` does
-    command: str = ""
-    profiles: bool = True  #: whether the profile matters
 
 
 @dataclass(frozen=True)
@@ -64,11 +45,15 @@ class Fidelity:
     trials: Mapping[str, Trial]  #: by name
     #: rows by the name of the table in the page, in its order
     tables: Mapping[str, tuple[Row, ...]]
+    elsewhere: Mapping[str, str] = field(default_factory=dict)  #: files of tables that have another
 
     @property
     def rows(self) -> Iterator[Row]:
         for rows in self.tables.values():
             yield from rows
+
+    def page_of(self, table: str) -> str:
+        return self.elsewhere.get(table, self.page)
 
     def command(self, device: str, row: Row) -> str:
         """Arguments of `cubestack` that show the row's value."""
@@ -108,6 +93,12 @@ class Job:
     profile: str  #: of it; the first one where all are the same
     frames: int  #: how many
     seconds: float  #: roughly what it takes
+
+    @property
+    def key(self) -> str:
+        """Its name in the device's record."""
+        both = fidelity_of(self.device).trials[self.trial].profiles
+        return f"{self.trial}, {self.profile}" if both else self.trial
 
 
 @dataclass(frozen=True)
@@ -222,38 +213,6 @@ def shown(row: Row, figures: Figures) -> str:
     return re.sub(r"\bnan\b", "-", row.ours.format(**figures))
 
 
-def measured(
-    device: str,
-    summary: Callable[[Sequence[Any]], Figures],
-    frames: int,
-    quick: int = 2,
-    seconds: float = 10.0,
-    seed: int = 1,
-    units: int = 1,
-    **options: Any,
-) -> Trial:
-    """A trial of `cubestack measure`: ``summary`` computes figures of its results.
-
-    ``units`` is the number of devices for the frames, with seeds from ``seed`` on. With several, no
-    single command repeats it, and `cubestack fidelity` shows the rows.
-    """
-
-    def run(opened: Opener[Any, Any], count: int) -> Figures:
-        results: list[Result] = []
-        used = min(units, max(1, count // units))
-        for number in range(seed, seed + used):
-            each: dict[str, Any] = {"frames": count // used, "seed": number}
-            results += measure(device, **each, **opened.board, **options)
-        return summary(results)
-
-    if units > 1:
-        return Trial(run, frames, quick, seconds)
-    words = ["measure", device, "--frames", str(frames), "--seed", str(seed)]
-    for name, value in options.items():
-        words += [option_string(name)] if value is True else [option_string(name), str(value)]
-    return Trial(run, frames, quick, seconds, " ".join(words))
-
-
 # --- pages ----------------------------------------------------------------------------------------
 
 
@@ -267,8 +226,9 @@ def marks(table: str) -> tuple[str, str]:
     return f"<!-- rows: {table} -->\n", "<!-- end of rows -->\n"
 
 
-def rewritten(page: str, rows: Sequence[Measured]) -> str:
+def rewritten(page: str, rows: Iterable[Measured]) -> str:
     """A page with its tables replaced; raises ValueError with a table that it lacks."""
+    rows = list(rows)
     for table in dict.fromkeys(row.table for row in rows):
         begin, end = marks(table)
         if begin not in page:
@@ -278,9 +238,3 @@ def rewritten(page: str, rows: Sequence[Measured]) -> str:
         own = [row for row in rows if row.table == table]
         page = f"{before}{begin}\n{markdown(own)}\n{end}{rest}"
     return page
-
-
-def mean(values: Iterable[float]) -> float:
-    """Mean of the values; nan if there are none."""
-    listed = list(values)
-    return math.fsum(listed) / len(listed) if listed else math.nan

@@ -9,40 +9,12 @@ import pytest
 from cubestack.emulator.camera.ov7620.fisheye import DISTORTION
 from cubestack.emulator.native.compiler import find_compiler
 from cubestack.emulator.scene.earth_sun import CameraTarget
-from cubestack.host.devices.registry import BUILT_IN
 from cubestack.host.studies.aramis import fidelity as aramis
 from cubestack.host.studies.cubesense import fidelity as cubesense
 from cubestack.host.studies.cubesense.fidelity import _lens
 from cubestack.host.studies.cubestar import fidelity as cubestar
 from cubestack.host.studies.cubestar.shots import Shot
-from cubestack.host.studies.fidelity import table as fidelity
 from cubestack.host.studies.fidelity.table import Job, fidelity_of, perform
-
-from .test_table import page_rows
-
-LONG = {"calibration"}
-CHEAP = [
-    (device, name)
-    for device in BUILT_IN
-    for name, trial in fidelity_of(device).trials.items()
-    if (not trial.profiles or name == "tiles") and name not in LONG
-]
-
-
-@pytest.mark.skipif(find_compiler() is None, reason="the whole stack needs the compiled FPGA")
-@pytest.mark.parametrize(("device", "name"), CHEAP)
-def test_measured_figures_match_the_fidelity_page(device: str, name: str) -> None:
-    trial = fidelity_of(device).trials[name]
-    found = [
-        perform(Job(device, name, profile, trial.frames, 1.0))
-        for profile in (("published", "extended") if trial.profiles else ("published",))
-    ]
-    rows = [(row, cells) for row, cells in page_rows(device) if row.trial == name]
-    assert rows
-    for row, cells in rows:
-        for figures, cell in zip([*found, found[-1]], cells[3:5], strict=False):
-            assert fidelity.shown(row, figures) == cell, row.key
-
 
 # --- sums over results ----------------------------------------------------------------------------
 

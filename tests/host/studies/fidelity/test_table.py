@@ -1,7 +1,7 @@
 """Published figures: what devices declare, the command that measures ours, and the pages."""
 
 import json
-from collections.abc import Iterator
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,15 +12,13 @@ from cubestack.emulator.native.compiler import find_compiler
 from cubestack.host.cli.main import make_parser
 from cubestack.host.devices.registry import BUILT_IN, device
 from cubestack.host.studies.fidelity import command as runs
+from cubestack.host.studies.fidelity import recorded
 from cubestack.host.studies.fidelity import table as fidelity
-from cubestack.host.studies.fidelity.table import (
-    Fidelity,
-    Job,
-    Row,
-    Trial,
-    fidelity_of,
-    read_tables,
-)
+from cubestack.host.studies.fidelity.recorded import all_jobs, pages, record_file
+from cubestack.host.studies.fidelity.table import Fidelity, Job, Row, fidelity_of, read_tables
+from cubestack.host.studies.rows.estimate import Estimate
+from cubestack.host.studies.rows.record import load, measurement, save
+from cubestack.host.studies.rows.trial import Trial
 from tests.conftest import Run
 
 ROOT = Path(__file__).parents[4]
@@ -138,49 +136,53 @@ def page(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     return tmp_path / "page.md"
 
 
-def test_write_replaces_only_the_tables(run: Run, page: Path) -> None:
-    done = run("fidelity", "aramis", "--write", page.parent, "--workers", "1")
+def test_write_replaces_only_the_tables(page: Path) -> None:
+    device, job = "aramis", Job("aramis", "walk", "published", 0, 1.0)
+    figures = {"v": Estimate(2.5, 2.0, 3.0)}
+    save(record_file(page.parent, device), {job.key: measurement("walk", 1.0, figures, [])})
+    (found,) = pages(page.parent, device).values()
+    assert found == PAGE  # a table without all of its values stays
+    every = {one.key: measurement("walk", 1.0, figures, []) for one in all_jobs(device)}
+    save(record_file(page.parent, device), every)
+    (found,) = pages(page.parent, device).values()
+    ours = "2.5 (2.0 to 3.0) m/s"
+    cells = f"speed | section 1 | 3 m/s | {ours} | {ours} | fitted | `fidelity aramis --rows a`"
+    assert f"| {cells} |\n" in found
+    assert found.startswith("above\n")
+    assert found.endswith("below\n")
+    assert "old" not in found
+
+
+@pytest.mark.parametrize("option", [("--quick",), ("--frames", "2")])
+def test_write_rejects_parts_of_a_row(run: Run, option: tuple[str, ...]) -> None:
+    assert "--write measures rows whole" in run("fidelity", "aramis", "--write", *option).line
+
+
+@pytest.mark.slow
+def test_write_measures_and_stores(run: Run, tmp_path: Path) -> None:
+    shutil.copy(ROOT / "docs" / fidelity_of("cubesense").page, tmp_path)
+    done = run(
+        "fidelity", "cubesense", "--rows", "memory-free", "--write", tmp_path, "--workers", "1"
+    )
     assert done.code == 0
-    assert f"wrote 1 rows to {page}\n" in done.err
-    once = page.read_text()
-    assert once.startswith("above\n")
-    assert once.endswith("below\n")
-    assert "old" not in once
-    cells = "speed | section 1 | 3 m/s | 11.5 m/s | 10.5 m/s | fitted | `fidelity aramis --rows a`"
-    assert f"| {cells} |\n" in once
-    run("fidelity", "aramis", "--write", page.parent, "--workers", "1")
-    assert page.read_text() == once
+    (stored,) = load(record_file(tmp_path, "cubesense")).items()
+    assert stored[0] == "memory"
+    assert stored[1].call == "_memory"
+    assert stored[1].changed == []
+    assert any(
+        one.startswith("host/studies/cubesense/fidelity.py:_memory ") for one in stored[1].depends
+    )
 
 
 def test_write_rejects_a_page_without_markers_before_measuring(
     run: Run, page: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(fidelity, "perform", None)
+    monkeypatch.setattr(recorded, "measured_anew", None)
     page.write_text("nothing\n")
     for folder in (page.parent, page.parent / "none"):
         refused = run("fidelity", "aramis", "--write", folder)
         assert refused.code == 2
         assert "has no <!-- rows: pace -->" in refused.line
-
-
-def page_rows(name: str) -> Iterator[tuple[Row, list[str]]]:
-    """Rows of a device, and their cells on the page."""
-    wanted = fidelity_of(name)
-    page = (ROOT / "docs" / wanted.page).read_text(encoding="utf-8")
-    for table, rows in wanted.tables.items():
-        begin, end = fidelity.marks(table)
-        lines = page.split(begin)[1].split(end)[0].strip().splitlines()[2:]
-        for row, line in zip(rows, lines, strict=True):
-            yield row, line.removeprefix("| ").removesuffix(" |").split(" | ")
-
-
-@pytest.mark.parametrize("name", BUILT_IN)
-def test_page_rows_match_the_declared_rows(name: str) -> None:
-    for row, cells in page_rows(name):
-        command = f"`{fidelity_of(name).command(name, row)}`"
-        expected = [row.figure, row.source, row.published, row.word, command]
-        assert cells[:3] + cells[5:] == expected
-        assert all(cells[3:5]), row.key
 
 
 def test_remaining_time_scales_with_the_time_so_far(

@@ -1,0 +1,113 @@
+"""Rows of the pages from stored measurements, and which of these are no longer true."""
+
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from cubestack.firmware_model.interface.codec.switches import PROFILES
+from cubestack.host.studies.fidelity.table import (
+    Job,
+    Measured,
+    Row,
+    chosen_rows,
+    fidelity_of,
+    filled,
+    jobs_of,
+    perform,
+    rewritten,
+)
+from cubestack.host.studies.rows.record import Measurement, load, measurement, save
+from cubestack.host.studies.rows.trace import Trace
+from cubestack.host.studies.workers import performed_afresh
+
+FOLDER = "data"
+"""Of the documentation: measurements of each device in a file."""
+
+
+def record_file(docs: Path, device: str) -> Path:
+    return docs / FOLDER / f"{device}.json"
+
+
+def all_jobs(device: str) -> list[Job]:
+    return jobs_of(device, fidelity_of(device).rows)
+
+
+def rows_of(job: Job) -> list[Row]:
+    """Rows with figures of a job."""
+    return [row for row in fidelity_of(job.device).rows if row.trial == job.trial]
+
+
+def measured_anew(job: Job) -> Measurement:
+    """Run a job in this process, which must be a new one: first a few frames, to see what runs."""
+    trial, trace = fidelity_of(job.device).trials[job.trial], Trace()
+    started = time.process_time()
+    with trace.running():
+        figures = perform(replace(job, frames=trial.quick))
+    if job.frames:
+        started = time.process_time()
+        figures = perform(job)
+    return measurement(trial.call, time.process_time() - started, figures, trace.entries())
+
+
+def renewed(
+    docs: Path, jobs: Sequence[Job], workers: int, on_done: Callable[[Job], None]
+) -> Iterator[str]:
+    """Run the jobs and store each in its device's file; yields values that are no longer the same.
+
+    What a device no longer declares leaves its file.
+    """
+    order = sorted(jobs, key=lambda job: -job.seconds)
+    for job, found in performed_afresh(measured_anew, order, workers):
+        path = record_file(docs, job.device)
+        stored = load(path)
+        yield from _differences(job, stored.get(job.key), found)
+        known = {one.key for one in all_jobs(job.device)}
+        save(path, {key: one for key, one in stored.items() if key in known} | {job.key: found})
+        on_done(job)
+
+
+def _differences(job: Job, was: Measurement | None, found: Measurement) -> Iterator[str]:
+    rows = [("", row) for row in rows_of(job)]
+    before = filled(job.device, rows, {job: was.figures} if was else {})
+    for old, new in zip(before, filled(job.device, rows, {job: found.figures}), strict=True):
+        if was is not None and old.ours != new.ours:
+            yield f"{job.device} {new.key}: {old.ours[job.profile]} is now {new.ours[job.profile]}"
+
+
+def stale(docs: Path, devices: Iterable[str]) -> dict[Job, str]:
+    """Jobs whose stored measurement is missing or of other code, each with the reason."""
+    found = {}
+    for device in devices:
+        stored = load(record_file(docs, device))
+        for job in all_jobs(device):
+            one = stored.get(job.key)
+            trial = fidelity_of(device).trials[job.trial]
+            if one is None:
+                found[job] = "never measured"
+            elif one.call != trial.call:
+                found[job] = f"it was {one.call}"
+            elif one.changed:
+                found[job] = f"changed since: {', '.join(one.changed)}"
+    return found
+
+
+def recorded_rows(docs: Path, device: str) -> list[Measured]:
+    """All rows of a device, with the stored values where there are any."""
+    stored = load(record_file(docs, device))
+    found = {job: stored[job.key].figures for job in all_jobs(device) if job.key in stored}
+    return list(filled(device, chosen_rows(device), found))
+
+
+def pages(docs: Path, device: str) -> dict[Path, str]:
+    """Pages with a device's tables, with the stored values in those that have all of them."""
+    declared, rows = fidelity_of(device), recorded_rows(docs, device)
+    missing = {row.table for row in rows if set(row.ours) != set(PROFILES)}
+    found = dict[Path, str]()
+    for table in declared.tables:
+        path = docs / declared.page_of(table)
+        found.setdefault(path, path.read_text("utf-8"))
+        if table not in missing:
+            own = [row for row in rows if row.table == table]
+            found[path] = rewritten(found[path], own)
+    return found

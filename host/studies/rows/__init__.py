@@ -1,0 +1,1 @@
+"""Figures of the documents as data: values with limits, and the code that they depend on."""

@@ -1,0 +1,148 @@
+"""The pages' rows: of the present code, as stored, and what they show when measured again."""
+
+import random
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+
+from cubestack.emulator.native.compiler import find_compiler
+from cubestack.host.devices.registry import BUILT_IN
+from cubestack.host.studies.fidelity.recorded import (
+    all_jobs,
+    measured_anew,
+    pages,
+    record_file,
+    rows_of,
+    stale,
+)
+from cubestack.host.studies.fidelity.table import Job, fidelity_of, perform, shown
+from cubestack.host.studies.rows.record import load, save
+from tests.conftest import Run
+
+DOCS = Path(__file__).parents[4] / "docs"
+
+DAY = datetime.now(UTC).toordinal()
+"""Selects the rows that are measured again today."""
+
+compiled = pytest.mark.skipif(find_compiler() is None, reason="needs the compiled FPGA")
+
+
+def test_every_row_was_measured_with_the_present_code() -> None:
+    found = [
+        f"{job.device} {', '.join(row.key for row in rows_of(job))} ({job.profile}): {reason}"
+        for job, reason in stale(DOCS, BUILT_IN).items()
+    ]
+    assert not found, "\n".join(["`make fidelity FIGURES=--stale` measures anew:", *found])
+
+
+@pytest.mark.parametrize("device", BUILT_IN)
+def test_pages_show_the_stored_figures(device: str) -> None:
+    found = pages(DOCS, device)
+    assert DOCS / fidelity_of(device).page in found
+    for path, text in found.items():
+        assert path.read_text("utf-8") == text, path.name
+
+
+def test_records_have_no_other_measurements() -> None:
+    for device in BUILT_IN:
+        assert load(record_file(DOCS, device)).keys() == {job.key for job in all_jobs(device)}
+
+
+def test_all_rows_together_take_at_most_twenty_minutes_on_two_cores() -> None:
+    stored = [one for name in BUILT_IN for one in load(record_file(DOCS, name)).values()]
+    assert sum(one.seconds for one in stored) < 2 * 20 * 60
+
+
+# --- measured again -------------------------------------------------------------------------------
+
+
+def by_cost(least_s: float, most_s: float) -> list[Job]:
+    """Jobs whose stored time is within these limits."""
+    return [
+        job
+        for device in BUILT_IN
+        for job in all_jobs(device)
+        if least_s <= load(record_file(DOCS, device))[job.key].seconds < most_s
+    ]
+
+
+def check(job: Job) -> None:
+    stored = load(record_file(DOCS, job.device))[job.key].figures
+    found = perform(job)
+    for row in rows_of(job):
+        assert shown(row, found) == shown(row, stored), f"{job.device} {row.key}, {job.profile}"
+
+
+@compiled
+def test_sample_of_short_rows_is_the_same_today() -> None:
+    short = by_cost(0, 1)
+    for job in random.Random(DAY).sample(short, min(4, len(short))):
+        check(job)
+
+
+@compiled
+@pytest.mark.slow
+def test_todays_part_of_the_rows_is_the_same() -> None:
+    """A third of those below 20 s, and one of the others."""
+    longer = by_cost(20, 1e9)
+    for job in [*by_cost(0, 20)[DAY % 3 :: 3], *longer[DAY % max(len(longer), 1) :][:1]]:
+        check(job)
+
+
+# --- stale ----------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def docs(tmp_path: Path) -> Path:
+    save(record_file(tmp_path, "aramis"), load(record_file(DOCS, "aramis")))
+    return tmp_path
+
+
+def test_changed_code_makes_its_rows_stale_by_name(
+    docs: Path, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = record_file(docs, "aramis")
+    stored = load(path)
+    lookups = stored["lookups"]
+    file = "firmware_model/aramis/matching/triples.py"
+    (entry,) = (one for one in lookups.depends if one.startswith(file))
+    others = tuple(one for one in lookups.depends if one != entry)
+    save(path, stored | {"lookups": replace(lookups, depends=(*others, f"{file} 0000000000"))})
+    assert {job.trial: reason for job, reason in stale(docs, ["aramis"]).items()} == {
+        "lookups": f"changed since: {file}"
+    }
+    monkeypatch.chdir(docs.parent)
+    (docs.parent / "docs").symlink_to(docs)
+    found = run("fidelity", "aramis", "--stale")
+    assert found.code == 1
+    keys = "lookup-area, lookup-moment, lookup-both, lookup-pivot"
+    assert found.out.splitlines() == [f"aramis, lookups: rows {keys}: changed since: {file}"]
+
+
+def test_other_arguments_and_new_trials_make_rows_stale(docs: Path) -> None:
+    path = record_file(docs, "aramis")
+    stored = load(path)
+    del stored["catalogue"]
+    save(path, stored | {"lookups": replace(stored["lookups"], call="_lookups, 3 frames")})
+    assert {job.trial: reason for job, reason in stale(docs, ["aramis"]).items()} == {
+        "lookups": "it was _lookups, 3 frames",
+        "catalogue": "never measured",
+    }
+
+
+@compiled
+def test_measurement_depends_on_firmware_camera_and_gateware() -> None:
+    (job,) = (job for job in all_jobs("cubesense") if job.key == "memory")
+    found = measured_anew(replace(job, trial="sun-still", profile="published", frames=6))
+    files = {one.partition(" ")[0].partition(":")[0] for one in found.depends}
+    assert files > {
+        "firmware_model/cubesense/vision/sun.py",
+        "firmware_model/mcu/pic18.py",
+        "emulator/camera/ov7620/lens_error.py",
+        "emulator/light/pixels.cpp",
+        "hdl/cubesense/pair.py",
+        "host/studies/cubesense/fidelity.py",
+    }
+    assert not {one for one in files if "aramis" in one or "ground" in one}
