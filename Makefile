@@ -122,7 +122,7 @@ test-suites: .venv/ready-dev
 FIGURES ?=
 
 fidelity: .venv/ready-dev
-	@$(BIN)/cubestack fidelity $(FIGURES) --write
+	@OPENBLAS_NUM_THREADS=1 $(BIN)/cubestack fidelity $(FIGURES) --write
 
 bench: .venv/ready-run
 	@$(BIN)/cubestack bench

@@ -16,11 +16,12 @@ from cubestack.emulator.scene.sky import SkyScene
 from cubestack.emulator.sim.power import PowerModel
 from cubestack.emulator.sim.virtual_time import Kernel
 from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, PIXEL_PITCH_MM, ROWS
+from cubestack.firmware_model.interface.cubestar.pins import Layout
 from cubestack.host.experiments.attitude import AttitudeResult
 from cubestack.host.experiments.cubestar.measure import CubeStarOpener
 from cubestack.host.studies.calibrate import CalibrateOptions
 from cubestack.host.studies.cubestar.calibrate import EXPERIMENT
-from cubestack.host.studies.cubestar.layouts import attitudes_of_loop
+from cubestack.host.studies.cubestar.layouts import LayoutOptions, attitudes_of_loop, measure_layout
 from cubestack.host.studies.cubestar.night import night
 from cubestack.host.studies.cubestar.shots import PICTURES, Shot, field_shots, slewing_shots
 from cubestack.host.studies.fidelity.table import Fidelity, read_tables
@@ -249,6 +250,20 @@ def _optics(_opened: CubeStarOpener, _frames: int) -> Figures:
     }
 
 
+def _layout(opened: CubeStarOpener, frames: int, layout: str) -> Figures:
+    """Of a memory layout in its loop over as many seconds; nan for what has no attitudes."""
+    found = measure_layout(Layout(layout), opened, LayoutOptions(seconds=frames))
+    names = ("rate_hz", "age_ms", "oldest_ms", "power_mw", "energy_mj")
+    return {
+        **{name: getattr(found, name) or np.nan for name in names},
+        "copy_ms": found.phase_ms["transfer"],
+        "pins": found.pins,
+        "tiles": found.tiles,
+        "fpgas": found.fpgas,
+        "right": rate_of(found.right or 0, found.attitudes),
+    }
+
+
 def _skies() -> dict[str, Trial]:
     """Tables 4.4 and 4.5: skies and modes."""
     skies: dict[str, dict[str, Any]] = {f"v{v}": {"mag_limit": v} for v in (3.6, 3.7, 3.8)}
@@ -282,6 +297,10 @@ FIDELITY = Fidelity(
         "full": _measured(60, mag_limit=4.5),
         "night": Trial(night, 30, 1, 50),
         "loop": Trial(_loop, 20, 2, 10),
+        **{
+            f"layout-{layout.value}": Trial(partial(_layout, layout=layout.value), 30, 2, 5)
+            for layout in Layout
+        },
         "calibration": Trial(
             _calibration, 20, 6, 5, "calibrate cubestar --emulated 20 --seed 0", profiles=False
         ),
@@ -291,4 +310,5 @@ FIDELITY = Fidelity(
         "optics": Trial(_optics, profiles=False),
     },
     tables=read_tables("cubestack.host.studies.cubestar"),
+    elsewhere={"memory layouts": "layouts.md"},
 )

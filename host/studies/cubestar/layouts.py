@@ -91,7 +91,7 @@ class _Layouts(Experiment["CubeStarOpener", LayoutOptions, LayoutResult]):
 
     def run(self, opened: CubeStarOpener, options: LayoutOptions) -> Iterator[LayoutResult]:
         for layout in Layout:
-            yield _measure(layout, opened, options)
+            yield measure_layout(layout, opened, options)
 
     def row(self, number: int, result: LayoutResult) -> tuple[str, ...]:
         each = f"{result.fpgas} x " if result.fpgas > 1 else ""
@@ -121,7 +121,7 @@ def _shown(value: float | None, digits: int = 0) -> str:
     return "-" if value is None else f"{value:.{digits}f}"
 
 
-def _measure(layout: Layout, opened: CubeStarOpener, options: LayoutOptions) -> LayoutResult:
+def measure_layout(layout: Layout, opened: CubeStarOpener, options: LayoutOptions) -> LayoutResult:
     """Run the loop of ``layout`` for ``seconds`` of virtual time after settling."""
     with opened(options.scene, seed=options.seed, layout=layout.value) as emulated:
         emulated.client.client.command("Trigger")

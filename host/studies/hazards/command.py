@@ -35,7 +35,7 @@ from cubestack.host.experiments.scene_truth import cameras_of
 from cubestack.host.output import write_output
 from cubestack.host.pictures.figures import save_curves
 from cubestack.host.pictures.images import save_sample
-from cubestack.host.studies.hazards import curves
+from cubestack.host.studies.hazards import curves, recorded
 from cubestack.host.studies.hazards.curves import Point
 from cubestack.host.studies.workers import cores
 from cubestack.host.terminal import progress, say, show
@@ -78,7 +78,8 @@ def run(args: argparse.Namespace) -> int:
         check_page(args.out)
     workers = min(args.workers or cores(), len(jobs))
     points = []
-    for point in progress(curves.run(jobs, workers), len(jobs), "measuring", quiet=args.json):
+    found = recorded.renewed(args.out, jobs, workers) if args.out else curves.run(jobs, workers)
+    for point in progress(found, len(jobs), "measuring", quiet=args.json):
         points.append(point)
         if args.json:
             print(json.dumps(point.as_dict()), flush=True)
@@ -136,12 +137,16 @@ def check_page(folder: Path) -> None:
 
 
 def write_page(points: Sequence[Point], folder: Path, seed: int) -> int:
-    """Write images, curves, points and the page; returns the number of files."""
+    """Write images, curves, points and the page; returns the number of files.
+
+    Earlier points of other curves remain.
+    """
     pictures = folder / PICTURES
+    names = {point.hazard for point in points}
+    points = _merged(points, pictures / "points.jsonl")
     lines = [json.dumps(point.as_dict()) for point in points]
     write_output(pictures / "points.jsonl", "\n".join(lines) + "\n")
-    names = dict.fromkeys(point.hazard for point in points)
-    for name in names:
+    for name in sorted(names):
         own = [point for point in points if point.hazard == name]
         save_curves(
             {registered(device).title: of for device, of in _by_device(own).items()},
@@ -153,9 +158,20 @@ def write_page(points: Sequence[Point], folder: Path, seed: int) -> int:
         for device in _by_device(own):
             save_sample(sample(device, name, seed), pictures / f"{name}-{device}.jpg")
     before, after = _page(folder)
-    sections = [_section(name, [p for p in points if p.hazard == name]) for name in sorted(names)]
+    every = sorted({point.hazard for point in points})
+    sections = [_section(name, [p for p in points if p.hazard == name]) for name in every]
     write_output(folder / PAGE, before + BEGIN + "\n".join(sections) + END + after)
-    return 2 + len(names) + len({(point.hazard, point.device) for point in points})
+    return 2 + len(names) + len({(p.hazard, p.device) for p in points if p.hazard in names})
+
+
+def _merged(points: Sequence[Point], file: Path) -> list[Point]:
+    """The points, and those of other curves in a file; in the order of devices and hazards."""
+    measured = {(point.device, point.hazard) for point in points}
+    lines = file.read_text("utf-8").splitlines() if file.is_file() else []
+    stored = [Point(**json.loads(line)) for line in lines]
+    every = [*points, *(one for one in stored if (one.device, one.hazard) not in measured)]
+    order = curves.devices_with_hazards()
+    return sorted(every, key=lambda one: (order.index(one.device), one.hazard))
 
 
 def _page(folder: Path) -> tuple[str, str]:

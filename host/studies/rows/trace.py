@@ -2,12 +2,13 @@
 
 import sys
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import CodeType, FrameType
 from typing import Any
 
-from cubestack.host.studies.rows.sources import Name, entries, relative
+from cubestack.host.studies.rows.sources import ROOT, Name, entries, relative
 
 #: Of the studies, what only runs trials and stores what they return.
 _MACHINERY = (
@@ -31,6 +32,7 @@ class Trace:
     """Code that ran, but for that of imports: of their results, those count that the code uses."""
 
     def __init__(self) -> None:
+        self._begun = time.time()
         self._codes = set[CodeType]()
         self._importing = 0  # modules, one inside the other
 
@@ -53,13 +55,17 @@ class Trace:
             threading.setprofile(None)  # type: ignore[arg-type]
 
     def entries(self) -> list[str]:
-        """Entries of what the measurement depends on."""
+        """Entries of what the measurement depends on; RuntimeError if a file has changed since."""
         ran = set[Name]()
         for code in self._codes:
             file = relative(code.co_filename)
             if file is not None and not file.startswith(_MACHINERY):
                 ran.add((file, code.co_qualname.partition(".<locals>")[0]))
-        return entries(ran, _opened)
+        found = entries(ran, _opened)
+        for file in {one.partition(":")[0] for one in found}:
+            if (ROOT / file).stat().st_mtime > self._begun:
+                raise RuntimeError(f"{file} has changed while it was in use; measure again")
+        return found
 
 
 sys.addaudithook(_audit)

@@ -180,7 +180,7 @@ def measured(monkeypatch: pytest.MonkeyPatch, found: list[Found]) -> LayoutResul
     )
     monkeypatch.setattr(layouts, "attitudes_of_loop", lambda _board, _seconds: iter(found))
     options = LayoutOptions(seconds=2)
-    return layouts._measure(Layout.COPIED, lambda *_, **__: nullcontext(emulated), options)
+    return layouts.measure_layout(Layout.COPIED, lambda *_, **__: nullcontext(emulated), options)
 
 
 def test_age_grows_until_the_next_attitude(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,5 +1,6 @@
 import json
 import re
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
@@ -9,9 +10,17 @@ from scipy.stats import binomtest
 from cubestack.host.devices.registry import device
 from cubestack.host.experiments.hazard_options import known
 from cubestack.host.experiments.rates import wilson
-from cubestack.host.studies.hazards.command import PAGE, PICTURES
-from cubestack.host.studies.hazards.curves import Job, devices_with_hazards, hazards_of
+from cubestack.host.studies.hazards import recorded
+from cubestack.host.studies.hazards.command import PAGE, PICTURES, _merged
+from cubestack.host.studies.hazards.curves import (
+    Job,
+    Point,
+    devices_with_hazards,
+    hazards_of,
+    jobs_of,
+)
 from cubestack.host.studies.hazards.curves import run as run_jobs
+from cubestack.host.studies.rows.record import load
 from tests.conftest import Run
 
 
@@ -82,6 +91,27 @@ def test_page_numbers_match_the_points() -> None:
         assert row in page
 
 
+def test_stored_curves_are_of_the_present_code_and_those_of_the_page() -> None:
+    assert not recorded.stale(DOCS), "`make fidelity` measures them anew"
+    lines = (DOCS / PICTURES / "points.jsonl").read_text("utf-8").splitlines()
+    points = [Point(**json.loads(line)) for line in lines]
+    for name, stored in load(recorded.record_file(DOCS)).items():
+        assert recorded.figures([p for p in points if recorded.key(p) == name]) == stored.figures
+
+
+@pytest.mark.slow
+def test_todays_stored_curve_is_the_same() -> None:
+    stored = sorted(load(recorded.record_file(DOCS)).items())
+    for name, one in stored[datetime.now(UTC).toordinal() % max(len(stored), 1) :][:1]:
+        device, hazard = name.split()
+        frames, seed = (
+            int(re.findall(rf"--{word} (\d+)", one.call)[0]) for word in ("frames", "seed")
+        )
+        jobs = list(jobs_of(device, [hazard], frames, seed, "extended"))
+        assert recorded.call(tuple(jobs)) == one.call
+        assert recorded.figures(list(run_jobs(jobs, 1))) == one.figures
+
+
 def test_out_writes_images_curves_and_points(tmp_path: Path, run: Run) -> None:
     arguments = ("--hazard", "gradient", "--frames", "1", "--workers", "1", "--out", tmp_path)
     lines = run("hazards", "cubestar", *arguments, "--json").out.splitlines()
@@ -97,6 +127,23 @@ def test_out_writes_images_curves_and_points(tmp_path: Path, run: Run) -> None:
     page = (tmp_path / "hazards.md").read_text("utf-8")
     assert "## gradient" in page
     assert "| CubeStar | 60 | " in page
+    ((name, one),) = load(recorded.record_file(tmp_path)).items()
+    assert (name, one.changed) == ("cubestar gradient", [])
+    assert one.figures["60 right"] + one.figures["60 refused"] + one.figures["60 wrong"] == 1
+    assert any("hazards/veils.py:" in entry for entry in one.depends)
+    assert any("matching/confirmed.py:" in entry for entry in one.depends)
+
+
+def test_new_points_replace_those_of_their_curve(tmp_path: Path) -> None:
+    def point(device: str, hazard: str, strength: float, right: int) -> Point:
+        return Point(device, "extended", hazard, strength, 2, 4, right, 2 - right, 0, {})
+
+    old = [point("cubestar", "moon", 0.0, 1), point("cubestar", "veil", 0.0, 1)]
+    file = tmp_path / "points.jsonl"
+    file.write_text("".join(json.dumps(one.as_dict()) + "\n" for one in old))
+    new = [point("aramis", "moon", 0.0, 2), point("cubestar", "moon", 0.5, 2)]
+    assert set(map(repr, _merged(new, file))) == set(map(repr, [*new, old[1]]))
+    assert _merged(new, tmp_path / "none") == sorted(new, key=lambda one: one.device == "aramis")
 
 
 def test_rejects_a_page_without_markers_and_a_file_as_folder(tmp_path: Path, run: Run) -> None:
