@@ -9,6 +9,7 @@ import pytest
 
 from cubestack.emulator.boards.cubestar.compiled.build import COMPILER, compiler_version
 from cubestack.emulator.native.compiler import find_compiler
+from cubestack.firmware_model.mcu import cortex_m3
 from cubestack.host.devices.registry import device
 from cubestack.host.studies import costs as command
 from cubestack.host.studies.costs import CostMeasurement, CostReport
@@ -28,6 +29,25 @@ def test_page_table_is_up_to_date() -> None:
     page = (DOCS / costs().document).read_text("utf-8")
     told = page.split("<!-- costs -->\n")[1].split("<!-- end of costs -->\n")[0].strip()
     assert costs().page(recorded()).strip() == told
+
+
+@pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
+def test_charged_row_has_the_prices_that_were_just_written(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    def charged() -> float:
+        lines = costs().page([]).splitlines()
+        return float(lines[2].split("|")[3])  # of the search
+
+    before, data = charged(), json.loads(costs().file.read_text("utf-8"))
+    for build in data["builds"]:
+        build["operations"] = {name: 3 * cost for name, cost in build["operations"].items()}
+    (tmp_path / "costs.json").write_text(json.dumps(data))
+    monkeypatch.setattr(cortex_m3, "FILE", tmp_path / "costs.json")
+    try:
+        assert charged() > 1.5 * before
+    finally:
+        cortex_m3.load_measurements.cache_clear()
 
 
 def test_cost_table_columns_contain_all_phases_but_attitude() -> None:
