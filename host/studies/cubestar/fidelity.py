@@ -123,8 +123,8 @@ def _coverage(_opened: CubeStarOpener, frames: int) -> Figures:
         diameter = {3.5: 50.0, 5.0: 20.0}.get(limit, COVERAGE_DEG)  # figure 3.8's two examples
         seen = np.count_nonzero(cosines > np.cos(np.radians(diameter / 2)), axis=1)
         name = f"{limit:.1f}".replace(".", "_")
-        figures[f"three_{name}"] = rate_of(np.count_nonzero(seen >= 3), frames)
-        figures[f"five_{name}"] = rate_of(np.count_nonzero(seen >= 5), frames)
+        figures[f"three_{name}"] = rate_of(int(np.count_nonzero(seen >= 3)), frames)
+        figures[f"five_{name}"] = rate_of(int(np.count_nonzero(seen >= 5)), frames)
         figures[f"mean_{name}"] = average(seen)
     return figures
 

@@ -16,6 +16,7 @@ from cubestack.host.studies.fidelity.table import (
     jobs_of,
     perform,
     rewritten,
+    shown,
 )
 from cubestack.host.studies.rows.record import Measurement, load, measurement, save
 from cubestack.host.studies.rows.trace import Trace
@@ -68,11 +69,12 @@ def renewed(
 
 
 def _differences(job: Job, was: Measurement | None, found: Measurement) -> Iterator[str]:
-    rows = [("", row) for row in rows_of(job)]
-    before = filled(job.device, rows, {job: was.figures} if was else {})
-    for old, new in zip(before, filled(job.device, rows, {job: found.figures}), strict=True):
-        if was is not None and old.ours != new.ours:
-            yield f"{job.device} {new.key}: {old.ours[job.profile]} is now {new.ours[job.profile]}"
+    if was is None or was.figures.keys() != found.figures.keys():
+        return
+    for row in rows_of(job):
+        old, new = shown(row, was.figures), shown(row, found.figures)
+        if old != new:
+            yield f"{job.device} {row.key}, {job.profile}: {old} is now {new}"
 
 
 def stale(docs: Path, devices: Iterable[str]) -> dict[Job, str]:

@@ -33,7 +33,7 @@ class Estimate(float):
         return f"{float(self):{spec}} ({self.low:{spec}} to {self.high:{spec}})"
 
 
-def rate(outcomes: Iterable[bool]) -> Estimate:
+def rate(outcomes: Iterable[bool | None]) -> Estimate:
     """Percentage of the outcomes that are true, with Wilson's limits; nan if there are none."""
     listed = list(outcomes)
     return rate_of(sum(map(bool, listed)), len(listed))

@@ -52,7 +52,7 @@ class Trace:
             yield
         finally:
             sys.setprofile(None)
-            threading.setprofile(None)  # type: ignore[arg-type]
+            threading.setprofile(None)
 
     def entries(self) -> list[str]:
         """Entries of what the measurement depends on; RuntimeError if a file has changed since."""

@@ -65,7 +65,7 @@ def measured(
     of the names of figures that have no limits.
     """
     how = {"device": device, "summary": summary, "seed": seed, "units": units}
-    run = partial(_measured, **how, extremes=extremes, options=options)
+    run = partial(_measured, **how, extremes=extremes, options=options)  # type: ignore[arg-type]
     if units > 1:
         return Trial(run, frames, quick, seconds)
     words = ["measure", device, "--frames", str(frames), "--seed", str(seed)]

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from cubestack.host.studies import workers
-from cubestack.host.studies.workers import AHEAD, WorkersError, performed
+from cubestack.host.studies.workers import AHEAD, WorkersError, performed, performed_afresh
 
 
 def square(number: int) -> int:
@@ -52,6 +52,18 @@ def dask_cluster(workers: int = 2) -> Iterator[Any]:
 def scheduler() -> Iterator[str]:
     with dask_cluster() as cluster:
         yield cluster.scheduler_address
+
+
+def test_each_job_has_a_process_of_its_own_if_it_is_to_be_fresh(tmp_path: Path) -> None:
+    found = dict(performed_afresh(own_process, range(3), 2))
+    assert found.keys() == {0, 1, 2}
+    assert len({os.getpid(), *found.values()}) == 4
+    again = dict(performed_afresh(die_once, [(tmp_path / "mark", n) for n in (2, 3)], 1))
+    assert list(again.values()) == [2, 3]
+    with pytest.raises(WorkersError, match="the worker of 3 went away"):
+        list(performed_afresh(die, [3], 1))
+    with pytest.raises(ValueError, match="not 1"):
+        list(performed_afresh(fail, [1], 1))
 
 
 @pytest.mark.parametrize("workers", [1, 2, 3])
