@@ -9,14 +9,7 @@ import pytest
 
 from cubestack.emulator.native.compiler import find_compiler
 from cubestack.host.devices.registry import BUILT_IN
-from cubestack.host.studies.fidelity.recorded import (
-    all_jobs,
-    measured_anew,
-    pages,
-    record_file,
-    rows_of,
-    stale,
-)
+from cubestack.host.studies.fidelity.recorded import all_jobs, pages, record_file, rows_of, stale
 from cubestack.host.studies.fidelity.table import Job, fidelity_of, perform, shown
 from cubestack.host.studies.rows.record import load, save
 from tests.conftest import Run
@@ -132,13 +125,11 @@ def test_other_arguments_and_new_trials_make_rows_stale(docs: Path) -> None:
     }
 
 
-@compiled
-def test_measurement_depends_on_firmware_camera_and_gateware() -> None:
-    (job,) = (job for job in all_jobs("cubesense") if job.key == "memory")
-    found = measured_anew(replace(job, trial="sun-still", profile="published", frames=6))
-    files = {one.partition(" ")[0].partition(":")[0] for one in found.depends}
+def test_measurements_depend_on_firmware_camera_and_gateware() -> None:
+    stored = load(record_file(DOCS, "cubesense"))["sun-still, published"]
+    files = {one.partition(":")[0].partition(" ")[0] for one in stored.depends}
     assert files > {
-        "firmware_model/cubesense/vision/sun.py",
+        "firmware_model/cubesense/vision/sun_centroid.py",
         "firmware_model/mcu/pic18.py",
         "emulator/camera/ov7620/lens_error.py",
         "emulator/light/pixels.cpp",
