@@ -37,8 +37,8 @@ class CubeStarSwitches(Switches):
         "42.1",
         "57.3",
         "60",
-        source="sections 4.3.2 and 5.3.2 have 11 486 and 11 484 pairs, near the 11 483 of 42.1; the "
-        "field of view is 60 in section 4.3.4",
+        source="sections 4.3.2 and 5.3.2 have 11 486 and 11 484 pairs, near the 11 483 of 42.1; "
+        "the field of view is 60 in section 4.3.4",
         reason="57.3 is the diagonal of the calibrated camera, so that every pair in an image is "
         "listed",
     )
