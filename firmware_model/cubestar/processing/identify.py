@@ -23,6 +23,8 @@ from cubestack.firmware_model.star_tracker.search import MatchOutcome
 #: Stars that an identification needs when nothing is known (sections 4.3.5 and 5.3.4).
 FEWEST_STARS = 3
 
+_U32 = 0xFFFF_FFFF
+
 OUTCOME_FLAGS = {
     MatchOutcome.TOO_FEW_CENTROIDS: "LessThanThreeStarsDetected",
     MatchOutcome.TOO_FEW_MATCHED: "LessThanThreeStarsID",
@@ -75,6 +77,7 @@ class Searches:
                 margin_rad=margin,
                 field=view if switches.tracking == "verified" else None,
                 radius_deg=self._radius_deg(mode),
+                apart_s=((results.image_ms - attitude.image_ms) & _U32) / 1000,
             )
         boresight = None if mode is MatchMode.LOST_IN_SPACE else self._expected_boresight()
         if switches.voting == "algorithm-2":

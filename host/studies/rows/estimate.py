@@ -46,13 +46,15 @@ def rate_of(count: int, of: int) -> Estimate:
 
 
 def average(values: Iterable[float]) -> Estimate:
-    """Mean of the values, with limits from their scatter; nan if there are none."""
+    """Mean of the values, with limits from their scatter, within their range; nan if there are
+    none."""
     found = np.array(list(values), float)
     if not found.size:
         return Estimate(math.nan, math.nan, math.nan)
     half = CONFIDENCE_Z * found.std(ddof=1) / math.sqrt(found.size) if found.size > 1 else math.nan
     value = math.fsum(found) / found.size
-    return Estimate(value, value - half, value + half)
+    low, high = np.clip((value - half, value + half), found.min(), found.max())
+    return Estimate(value, low, high)
 
 
 def deviation(value: float, freedom: float) -> Estimate:

@@ -43,9 +43,9 @@ def solved(results: list[tuple[bool, int]], least: float) -> bool:
     return bool(rate >= least) and sum(wrong for _, wrong in results) <= 1
 
 
-@pytest.mark.parametrize("turn_deg", [0.0, 0.25])
+@pytest.mark.parametrize(("turn_deg", "apart_s"), [(0.0, 1.0), (0.25, 1.0), (0.38, 1.4)])
 def test_tracking_follows_small_rotations(
-    catalogue: StarCatalogue, shoot: Shoot, turn_deg: float
+    catalogue: StarCatalogue, shoot: Shoot, turn_deg: float, apart_s: float
 ) -> None:
     rng = np.random.default_rng(90)
     results = []
@@ -54,20 +54,22 @@ def test_tracking_follows_small_rotations(
         axis = rng.normal(size=3)
         turn = Rotation.from_rotvec(np.radians(turn_deg) * axis / np.linalg.norm(axis))
         last = (turn.as_matrix() @ shot.attitude).astype(np.float32)
-        results.append(
-            check(track(shot.directions, catalogue, last, meter(), field=pinhole()), shot.stars)
-        )
+        found = track(shot.directions, catalogue, last, meter(), field=pinhole(), apart_s=apart_s)
+        results.append(check(found, shot.stars))
     assert solved(results, 0.99)
 
 
-def test_tracking_is_lost_beyond_its_reach(catalogue: StarCatalogue, shoot: Shoot) -> None:
+@pytest.mark.parametrize("apart_s", [1.0, 30.0])
+def test_tracking_is_lost_beyond_its_reach(
+    catalogue: StarCatalogue, shoot: Shoot, apart_s: float
+) -> None:
     rng = np.random.default_rng(91)
     lost = 0
     for _ in range(40):
         shot = shoot(rng)
         turn = Rotation.from_rotvec(np.radians([1.0, 0, 0])).as_matrix()
         last = (turn @ shot.attitude).astype(np.float32)
-        found = track(shot.directions, catalogue, last, meter(), field=pinhole())
+        found = track(shot.directions, catalogue, last, meter(), field=pinhole(), apart_s=apart_s)
         lost += found.outcome is not MatchOutcome.IDENTIFIED
     assert lost >= 38
 
@@ -128,7 +130,7 @@ def test_nearest_star_search_charges_every_pair(catalogue: StarCatalogue) -> Non
     def charged(centroids: int, candidates: int) -> Counter[str]:
         own = meter()
         stars = np.arange(candidates, dtype=np.uint16)
-        _nearest(catalogue.vectors[:centroids], catalogue.vectors, stars, np.eye(3), own)
+        _nearest(catalogue.vectors[:centroids], catalogue.vectors, stars, np.eye(3), 0.01, own)
         return own.counts
 
     star = {"flash_read": 3, "f32_mul": 9, "f32_add": 6, "loop": 1}

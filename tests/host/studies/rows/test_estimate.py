@@ -42,6 +42,11 @@ def test_limits_of_a_mean_contain_it_in_95_percent_of_samples(summary: str) -> N
     assert 0.88 < inside / samples < 0.99
 
 
+def test_limits_of_a_mean_are_within_the_values() -> None:
+    found = average([100.0] * 40 + [60.0])
+    assert 60 < found.low < found < found.high == 100
+
+
 def test_limits_of_a_deviation_contain_it() -> None:
     rng, inside, samples = np.random.default_rng(4), 0, 400
     for _ in range(samples):
