@@ -8,9 +8,9 @@ reach.
 An extension: pictures more than a second apart widen the reach, up to twice, so that a camera that
 turns by 0.3 deg/s is followed; the verification round drops what contradicts the other stars; the
 rest corrects the attitude, which is confirmed like one that a triangle proposes
-(``star_tracker.observation``). Expected wrong attitudes are pairs of wrong stars: F^2 / 2 for F centroids in reach of a predicted
-star by chance, times the part whose sides agree, the margin over the reach. So neither a camera
-that looks elsewhere nor a wrong last attitude is accepted.
+(``star_tracker.observation``). Expected wrong attitudes are pairs of wrong stars: F^2 / 2 for F
+centroids in reach of a predicted star by chance, times the part whose sides agree, the margin over
+the reach. So neither a camera that looks elsewhere nor a wrong last attitude is accepted.
 """
 
 from math import radians, sin
