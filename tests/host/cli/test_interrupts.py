@@ -81,10 +81,11 @@ def test_ctrl_c_ends_the_command_in_order(words: str, after_s: float, tmp_path: 
             ends_well = finished or "Ctrl-C ends it" in said
             if process.returncode == 0 and not ends_well:  # too late, but nothing may be missing
                 undisturbed = subprocess.run(
-                    call, stdin=subprocess.DEVNULL, capture_output=True, cwd=tmp_path, text=True
-                )
+                    call, stdin=subprocess.DEVNULL, capture_output=True, cwd=tmp_path, env=ENV,
+                    text=True,
+                )  # fmt: skip
                 ends_well = told == undisturbed.stdout
             # A shell shows 130, too, for one that the signal ends before the script's first line.
-            assert process.returncode in ((0,) if ends_well else (130, -signal.SIGINT))
+            assert process.returncode in ((0,) if ends_well else (130, -signal.SIGINT)), said
     assert "Traceback" not in said
     assert "KeyboardInterrupt" not in said
