@@ -15,12 +15,14 @@ import argparse
 import json
 import sys
 from collections import Counter
+from collections.abc import Callable
 
 from cubestack.host.cli.arguments import add_flag
 from cubestack.host.cli.device_options import add_target_arguments, given_options, open_any_target
 from cubestack.host.conformance.comparison import Difference, compare, table
 from cubestack.host.conformance.contract import CheckResult, CheckRun, Verdict
 from cubestack.host.conformance.suite import run_suite
+from cubestack.host.targets import Target
 from cubestack.host.terminal import busy, tell
 
 MARKS = {Verdict.PASSED: "ok", Verdict.FAILED: "FAILED"}
@@ -40,23 +42,36 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     show = _show_json if args.json else _show_text
     runs = []
-    for number, text in enumerate([args.target, args.compare][: 1 + (args.compare is not None)]):
-        if number:  # options are the first target's, but for the device
-            args.bench = args.scene = args.baud = args.record = None
-            args.backup, args.engine = False, "auto"
-            vars(args).update(dict.fromkeys(given_options(args)))
-        target = open_any_target(text, args)
-        try:
-            args.device = args.device or target.interface.name.lower()
-            # The second target's results are compared only.
-            on_check = (lambda _check: None) if number else show
-            with busy(f"checking {target.name}", quiet=args.json):
-                runs.append(run_suite(target, args.allow_write, on_check))
-        finally:
-            target.close()
+    with open_any_target(args.target, args, keep=False) as target:
+        args.device = args.device or target.interface.name.lower()
+        second = _second(args)
+        if args.compare is not None:
+            try:
+                open_any_target(args.compare, second).close()
+            except BaseException:
+                target.outputs.drop()  # a wrong call replaces no recording
+                raise
+        target.outputs.keep()
+        runs.append(_checked(target, args, show))
+    if args.compare is not None:
+        with open_any_target(args.compare, second) as target:
+            runs.append(_checked(target, args, lambda _check: None))
     differences = compare(*runs) if len(runs) == 2 else []
     _summarise(runs, differences, as_json=args.json)
     return int(any(one.failed for one in runs) or bool(differences))
+
+
+def _second(args: argparse.Namespace) -> argparse.Namespace:
+    """The options are the first target's, but for the device."""
+    none = dict.fromkeys(("bench", "scene", "baud", "record", *given_options(args)))
+    return argparse.Namespace(**vars(args) | none | {"backup": False, "engine": "auto"})
+
+
+def _checked(
+    target: Target, args: argparse.Namespace, on_check: Callable[[CheckResult], None]
+) -> CheckRun:
+    with busy(f"checking {target.name}", quiet=args.json):
+        return run_suite(target, args.allow_write, on_check)
 
 
 def _show_text(check: CheckResult) -> None:
