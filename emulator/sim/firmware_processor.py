@@ -70,7 +70,7 @@ class FirmwareProcessor:
         couple: connects the machine's pins to an FPGA.
         look_ahead_ps: longest run of the machine: less than the time of a byte on the wires, so
             what a host begins to send while the machine is ahead arrives after the run. Longer
-            where the host does nothing before ``Kernel.idle_until``.
+            where the host does nothing before ``Kernel.idle_until`` and nobody watches steps.
         on_activity: called when the core falls asleep (False) or wakes (True).
         console: receives the text that the program prints on its debug channels, line by line.
         on_fault: called with a text when a fault stops the program for good.
@@ -262,7 +262,9 @@ class FirmwareProcessor:
     def _run_limit_ps(self) -> int:
         """The time before which no other event happens."""
         now_ps, horizon = self.env.now, self.env.horizon()
-        ahead_ps = max(now_ps + self.look_ahead_ps, self.env.idle_until)
+        ahead_ps = now_ps + self.look_ahead_ps
+        if not self.env.watched:
+            ahead_ps = max(ahead_ps, self.env.idle_until)
         if horizon is None:
             return ahead_ps
         if horizon <= now_ps:
