@@ -48,8 +48,11 @@ OWN = {
     "host/studies/costs.py": "our documents",
     "host/studies/cubestar/demo.py": "our package",
     "host/studies/fidelity/command.py": "our documents",
+    "host/studies/fidelity/recorded.py": "our documents",
     "host/studies/fidelity/table.py": "our package",
     "host/studies/hazards/command.py": "our documents",
+    "host/studies/rows/record.py": "our documents",
+    "host/studies/rows/sources.py": "our sources",
 }
 
 #: Tools of designs read the user's own sources, and what Yosys and simulators have written.

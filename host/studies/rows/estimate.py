@@ -14,7 +14,7 @@ SEED = 0
 
 
 class Estimate(float):
-    """A value with its 95 % limits; formatted as "94.0 (90.7 to 96.2)"."""
+    """A value with its 95 % limits, nan if it has none; formatted as "94.0 (90.7 to 96.2)"."""
 
     low: float
     high: float
@@ -28,7 +28,7 @@ class Estimate(float):
         return float(self), self.low, self.high
 
     def __format__(self, spec: str) -> str:
-        if math.isnan(self):
+        if math.isnan(self) or math.isnan(self.low):
             return format(float(self), spec)
         return f"{float(self):{spec}} ({self.low:{spec}} to {self.high:{spec}})"
 
