@@ -95,6 +95,7 @@ def run_program(
         with _Limit(timeout_s, run) as limit:
             _serve(bus, run, pace=pace, report=report)
         if limit.reached:
+            _ = program.exit_code  # waits: the program may end after its service
             raise subprocess.TimeoutExpired(list(command), timeout_s or 0.0)
     return program.exit_code
 

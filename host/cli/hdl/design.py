@@ -8,6 +8,7 @@ from cubestack.hdl.contract.contract import Contract
 from cubestack.hdl.contract.design import Design
 from cubestack.host.devices.device import AnyDevice
 from cubestack.host.devices.registry import device, devices
+from cubestack.host.emulation.emulated import power_up
 
 if TYPE_CHECKING:
     from cubestack.emulator.rtl.wiring import Wiring
@@ -35,12 +36,12 @@ def design_of(args: argparse.Namespace, text: str, image: str = "") -> Design:
 
 def fpga_wiring(chosen: AnyDevice, options: Mapping[str, Any]) -> "Wiring":
     """The FPGA of a device with these options of its board, and its surroundings."""
-    board = chosen.open_board(chosen.default_scene(), seed=0, engine="auto", **options)
+    emulated = power_up(chosen, **options)
     try:
-        assert board.engine is not None
-        return board.engine.wiring
+        assert emulated.board.engine is not None
+        return emulated.board.engine.wiring
     finally:
-        board.close()
+        emulated.close()
 
 
 def _contract(name: str | None) -> Contract:

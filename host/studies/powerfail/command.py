@@ -12,8 +12,6 @@ examples:
 """
 
 import argparse
-import json
-from dataclasses import asdict
 from pathlib import Path
 
 from rich.table import Table
@@ -89,14 +87,14 @@ def run(args: argparse.Namespace) -> int:
 def _replay(setup: Setup, course: Course, args: argparse.Namespace) -> int:
     witness = Witness() if args.gdb is None else Gdb(args.gdb, say)
     row = replay(setup, course, args.case, witness)
-    tell(json.dumps(asdict(row)) if args.json else report.told(row))
+    tell(report.line(row) if args.json else report.told(row))
     return 0 if row.right else 1
 
 
 def _show(rows: list[Row], *, as_json: bool) -> None:
     if as_json:
         for row in rows:
-            print(json.dumps(asdict(row)))
+            print(report.line(row))
         return
     head, lines = report.summary(rows)
     table = Table(*head)

@@ -36,10 +36,14 @@ def order(rows: Iterable[Row]) -> list[Row]:
     return sorted(rows, key=lambda row: tuple(map(int, row.case.split("."))))
 
 
+def line(row: Row) -> str:
+    """A row as a line of JSON."""
+    return json.dumps({"version": POWERFAIL_ROWS.current} | asdict(row))
+
+
 def write(folder: Path, setup: Setup, course: Course, rows: Sequence[Row]) -> Path:
     """Write rows and page; returns the page."""
-    version = {"version": POWERFAIL_ROWS.current}
-    lines = "".join(json.dumps(version | asdict(row)) + "\n" for row in rows)
+    lines = "".join(line(row) + "\n" for row in rows)
     write_outputs(folder, {ROWS: lines, PAGE: _page(setup, course, rows)})
     return folder / PAGE
 

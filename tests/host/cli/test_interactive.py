@@ -28,7 +28,14 @@ class Asked:
         self.closed = False
         self.interface = SimpleNamespace(name="CubeStar")
         self.target, self.name = self, "fake"
+        self.outputs = SimpleNamespace(keep=lambda: None)
         self.on_row: Callable[[CommandResult], None] = lambda _result: None
+
+    def __enter__(self) -> "Asked":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
     def close(self) -> None:
         self.closed = True
@@ -53,7 +60,7 @@ class Asked:
 @pytest.fixture
 def asked(monkeypatch: pytest.MonkeyPatch) -> Asked:
     one = Asked()
-    monkeypatch.setattr(shell, "open_any_target", lambda *_of: one)
+    monkeypatch.setattr(shell, "open_any_target", lambda *_of, **_how: one)
     monkeypatch.setattr(shell, "Shell", lambda _target: one)
     return one
 

@@ -73,7 +73,7 @@ FAILED, WRONG_CALL = 1, 2
             "--precision must be one of own, float, literals, double, not half",
         ),
         ("fidelity --rows colour", "no row is like colour"),
-        ("fidelity --write --quick", "--write wants all rows"),
+        ("fidelity --write --quick", "--write measures rows whole: without --quick"),
         ("new-sensor sun-slit", "a device's name is an identifier of small letters, not sun-slit"),
         ("new-sensor Glow", "a device's name is an identifier of small letters, not Glow"),
         ("new-sensor class", "a device's name is an identifier of small letters, not class"),
