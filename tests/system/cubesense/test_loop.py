@@ -18,24 +18,32 @@ TURNS = 6
 TURNING = replace(FACING, rate_deg_s=(0.5, -1.0, 2.0))
 
 
-def loop(opened: AnyEmulated, turns: int = TURNS) -> list[dict[Camera, Measurement]]:
-    """Reads both results every second; the memories alternate from turn to turn."""
+def loop(opened: AnyEmulated, swap: bool, turns: int = TURNS) -> list[dict[Camera, Measurement]]:
+    """Reads both results every second; with ``swap`` each picture goes to its own memory in even
+    turns, to the other one in odd turns, else always to its own."""
     cubesense, kernel = opened.client, opened.board.kernel
     cubesense.client.pause(0.3)
     found = []
     for turn in range(turns + 1):
         due = kernel.now + PS_PER_S
-        memories = {camera: Sram((camera + turn) % 2) for camera in Camera}
+        memories = {camera: Sram((camera + turn * swap) % 2) for camera in Camera}
         found.append({c: cubesense.result_then_schedule(c, sram) for c, sram in memories.items()})
         cubesense.client.pause((due - kernel.now) / PS_PER_S)
     return found[1:]
 
 
-def test_every_iteration_measures_the_current_second(session: Open) -> None:
-    with session(TURNING) as opened:
-        turns = loop(opened)
+@pytest.mark.parametrize(
+    ("gateware", "swap"), [("one-search", False), ("both-searches", True), ("corrected", True)]
+)
+def test_every_iteration_measures_the_current_second(
+    session: Open, gateware: str, swap: bool
+) -> None:
+    """But for the other memory with one search: its nadir image crosses the link in 11 s."""
+    with session(TURNING, set=f"lens=nominal,gateware={gateware}") as opened:
+        turns = loop(opened, swap)
     for number, turn in enumerate(turns):
-        stored = (CaptureResult.STORED_OWN_SRAM, CaptureResult.STORED_OTHER_SRAM)[number % 2]
+        other = swap and number % 2
+        stored = CaptureResult.STORED_OTHER_SRAM if other else CaptureResult.STORED_OWN_SRAM
         for camera, found in turn.items():
             assert (found.detected, found.capture) == (True, stored)
             # Within the second in which it was taken, what the sensor sees turns by 2.3 deg.
@@ -48,9 +56,9 @@ def test_every_iteration_measures_the_current_second(session: Open) -> None:
 @pytest.mark.parametrize("scene", [EarthSunScene(), TURNING], ids=["still", "turning"])
 def test_emulation_is_faster_than_real_time(session: Open, scene: EarthSunScene) -> None:
     with session(scene) as opened:
-        loop(opened, 1)
+        loop(opened, True, 1)
         before_s, before_ps = time.process_time(), opened.board.kernel.now
-        loop(opened, TURNS)
+        loop(opened, True, TURNS)
         spent_s = time.process_time() - before_s
         virtual_s = (opened.board.kernel.now - before_ps) / PS_PER_S
     assert spent_s < virtual_s
