@@ -79,15 +79,21 @@ def life(
         }
 
 
-def pair_life(seed: int, gateware: str = "") -> dict[str, object]:
-    """Traffic and final state of a CubeSense with random poses, memories and faults."""
+def pair_life(seed: int, gateware: str, design: str = "") -> dict[str, object]:
+    """Traffic and final state of a CubeSense with random poses, memories and faults.
+
+    Args:
+        seed: of everything.
+        gateware: value of the switch, which the program follows.
+        design: files of both FPGAs in place of the shipped ones.
+    """
     rng = np.random.default_rng(seed)
     scene = EarthSunScene.facing(
         sun_deg=tuple(rng.uniform(-20, 20, 2)), nadir_deg=tuple(rng.uniform(-15, 15, 2))
     )
-    design = {"gateware": gateware} if gateware else {}
+    chosen = {"set": f"gateware={gateware}"} | ({"gateware": design} if design else {})
     view = EarthSunView(scene, FisheyeCondition(hot_pixels=20, seed=seed))
-    with open_device("cubesense", view, seed=seed, engine="compiled", **design) as opened:
+    with open_device("cubesense", view, seed=seed, engine="compiled", **chosen) as opened:
         recording = StringIO()
         recorder = start_recorder(opened, recording)
         kinds = [kind for kind, fault in FAULTS.items() if opened.faults.targets(fault.site)]
