@@ -9,7 +9,7 @@ the firmware's answer with the truth.
 examples:
   cubestack upsets cubesense
   cubestack upsets cubesense --registers 'sun.*' --json
-  cubestack upsets cubesense --gateware sun=sun.v,nadir=nadir.v
+  cubestack upsets cubesense --gateware sun=sun.v,nadir=nadir.v --answers corrected
   cubestack campaign seu-cubesense           the whole atlas, resumable, on all cores
 """
 
@@ -30,7 +30,7 @@ from cubestack.firmware_model.interface.cubesense.switches import (
     DEFAULT_SWITCHES,
     CubeSenseSwitches,
 )
-from cubestack.firmware_model.values import text
+from cubestack.firmware_model.values import choice, text
 from cubestack.host.clients.cubesense.client import CubeSense
 from cubestack.host.emulation.emulated import EmulatedDevice
 from cubestack.host.experiments.cubesense.measure import CubeSenseOptions, is_right, random_view
@@ -88,27 +88,35 @@ class CubeSenseUpsetOptions(GatewareUpsetOptions):
         "design of the pair, or of one FPGA: sun=..., nadir=... (docs/how-to/own-gateware.md)",
         metavar="VARIANT|FILE[:TOP]|MODULE:CLASS",
     )
+    answers: str = choice(
+        DEFAULT_SWITCHES.gateware,
+        "shipped variant like which your own design answers over the link, and whose other FPGA "
+        "it meets",
+        VARIANTS,
+    )
 
 
 @cache
-def _wiring(gateware: str, gateware_param: str) -> Wiring:
+def _wiring(gateware: str, gateware_param: str, answers: str) -> Wiring:
     if gateware in VARIANTS:
         return with_designs(wiring_of(gateware), "", gateware_param)
-    return with_designs(wiring_of(DEFAULT_SWITCHES.gateware), gateware, gateware_param)
+    return with_designs(wiring_of(answers), gateware, gateware_param)
 
 
 @cache
-def _rig_of(gateware: str, gateware_param: str) -> Rig:
+def _rig_of(gateware: str, gateware_param: str, answers: str) -> Rig:
     subjects = tuple(
         Subject(_scene, partial(_start, sram), _judge, _state, row_bytes=640) for sram in Sram
     )
     phases = (IDLE, STORING, BETWEEN, LINKED, READING)
     design = {"gateware": gateware, "gateware_param": gateware_param}
-    return Rig(subjects, partial(_wiring, **design), phases, ("sun", "nadir"), design)
+    wiring = partial(_wiring, **design, answers=answers)
+    board = design | ({} if gateware in VARIANTS else {"set": f"gateware={answers}"})
+    return Rig(subjects, wiring, phases, ("sun", "nadir"), board)
 
 
 EXPERIMENT = UpsetExperiment(
-    lambda options: _rig_of(options.gateware, options.gateware_param),
+    lambda options: _rig_of(options.gateware, options.gateware_param, options.answers),
     __doc__,
     decides=("profile", "set", *DECIDED, "mcu_addressing", "uart"),
     options=CubeSenseUpsetOptions,

@@ -160,16 +160,21 @@ def test_upset_experiment_covers_two_linked_fpgas(gateware: str) -> None:
 @pytest.mark.skipif(not have_yosys(), reason="no whole Yosys")
 # With one search, the Sun's FPGA samples its pixels while it sends alone.
 @pytest.mark.filterwarnings("default::cubestack.emulator.boards.gateware.GatewareNotice")
-def test_upsets_of_own_gateware_of_the_pair_are_those_of_the_shipped_one(tmp_path: Path) -> None:
-    top = tops_in(PAIR_TOPS)["cubesense-sun-one-search"]
-    (tmp_path / "sun.v").write_text(verilog_file("sun", top))
-    design = f"sun={tmp_path / 'sun.v'}"
+@pytest.mark.parametrize("variant", ["both-searches", "one-search"])
+def test_upsets_of_own_gateware_of_the_pair_are_those_of_the_shipped_one(
+    variant: str, tmp_path: Path
+) -> None:
+    """Beside the shipped FPGA of the nadir camera that it answers like."""
+    (tmp_path / "sun.v").write_text(
+        verilog_file("sun", tops_in(PAIR_TOPS)[f"cubesense-sun-{variant}"])
+    )
+    own_design = {"gateware": f"sun={tmp_path / 'sun.v'}", "answers": variant}
     shipped, own = (
         measured(
             *("cubesense", cubesense.EXPERIMENT),
-            **{"gateware": gateware, "registers": f"sun.{inside}pix_writer.ack", "memory_bits": 0},
+            **{**design, "registers": f"sun.{inside}pix_writer.ack", "memory_bits": 0},
         )
-        for gateware, inside in (("one-search", ""), (design, "design.core."))
+        for design, inside in (({"gateware": variant}, ""), (own_design, "design.core."))
     )
     renamed = [replace(one, target=one.target.replace("design.core.", "")) for one in own]
     assert {one.target for one in renamed} == {"sun.pix_writer.ack"}
