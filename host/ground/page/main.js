@@ -175,7 +175,7 @@ function select(number) {
         lamps.update({});
         answer.forget();
       }
-      latest = time_s ?? 0;
+      latest = time_s ?? latest; // it has none while the emulation does not answer
       if (message.values) {
         telemetry.update(message.values);
         lamps.update(message.values);

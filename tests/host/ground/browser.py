@@ -5,7 +5,7 @@ import re
 import signal
 import subprocess
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -89,6 +89,18 @@ def look(page: Any, device: str, *, emulated: bool = True) -> None:
         "(!emulated || document.querySelector('#time').textContent.endsWith(' s'))",
         arg=[device, emulated],
     )
+
+
+def lives(page: Any, change: Callable[[dict[str, Any]], dict[str, Any]]) -> None:
+    """Changes all messages that the server sends from now on."""
+
+    def connect(socket: Any) -> None:
+        server = socket.connect_to_server()
+        server.on_message(lambda text: socket.send(json.dumps(change(json.loads(text)))))
+
+    page.route_web_socket("**/live", connect)
+    page.reload()
+    page.wait_for_selector("#take")
 
 
 def line(page: Any, words: str) -> str:

@@ -1,16 +1,13 @@
-import json
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
 
-from ..browser import HOSTILE, hostile, line, look, shown
+from ..browser import HOSTILE, hostile, line, lives, look, shown
 
 pytestmark = [pytest.mark.xdist_group("page hostile"), pytest.mark.slow]
 
 DEVICES = ("cubestar", "cubesense")
-
-Change = Callable[[dict[str, Any]], dict[str, Any]]
 
 
 @pytest.fixture
@@ -20,18 +17,6 @@ def page(chromium: Any, address: str) -> Iterator[Any]:
         yield opened
         assert opened.locator("img, script:not([src])").count() == 0
         assert opened.evaluate("document.hacked") is None
-
-
-def lives(page: Any, change: Change) -> None:
-    """Changes all messages that the server sends from now on."""
-
-    def connect(socket: Any) -> None:
-        server = socket.connect_to_server()
-        server.on_message(lambda text: socket.send(json.dumps(change(json.loads(text)))))
-
-    page.route_web_socket("**/live", connect)
-    page.reload()
-    page.wait_for_selector("#take")
 
 
 @pytest.mark.parametrize("missing", [True, False])

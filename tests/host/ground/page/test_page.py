@@ -5,7 +5,7 @@ from axe_playwright_python.sync_playwright import Axe
 
 from tests.tiers import quick
 
-from ..browser import LOOKS, check_layout, line, look, shown
+from ..browser import LOOKS, check_layout, line, lives, look, shown
 
 pytestmark = pytest.mark.xdist_group("page")  # so that its emulations are started once
 
@@ -177,9 +177,14 @@ def test_back_returns_to_a_snapshot(page: Any) -> None:
 
 @pytest.mark.slow
 def test_results_and_flags_of_a_time_that_has_not_come_are_cleared(page: Any) -> None:
+    before = page.locator("#snapshots option").count()
     page.click("#snapshot")
-    page.wait_for_selector("#lines li.good >> text=snapshot")
+    page.wait_for_function(
+        "(before) => document.querySelector('#snapshots').options.length > before", arg=before
+    )
     page.click("#take")
+    # A summary may be there already. Time that went back now would leave the picture unanswered.
+    page.wait_for_selector("#lines li.good >> text=take a picture")
     page.wait_for_selector("#summary >> text=/stars identified/")
     page.wait_for_selector("#flags-set li.notice")
     page.click("#back")
@@ -192,6 +197,24 @@ def test_results_and_flags_of_a_time_that_has_not_come_are_cleared(page: Any) ->
     page.wait_for_function(
         "() => !document.querySelector('#summary').textContent.includes('Time went back')"
     )
+
+
+@pytest.mark.slow
+def test_time_goes_back_while_the_emulation_does_not_answer(page: Any) -> None:
+    told = [0]
+
+    def change(message: dict[str, Any]) -> dict[str, Any]:
+        told[0] += 1
+        if told[0] == 1:
+            return message
+        for name in ("results", "values"):
+            message.pop(name, None)
+        if told[0] == 2:
+            return message | {"emulation": {"error": "no answer"}, "pictures": None}
+        return message | {"emulation": message["emulation"] | {"time_s": 0.0}}
+
+    lives(page, change)
+    page.wait_for_selector("#summary >> text=/Time went back/")
 
 
 def test_fault_is_injected_and_logged(page: Any) -> None:
