@@ -25,14 +25,32 @@ def main() -> int:
 
         return run()
     sys.unraisablehook = deliver_again
+    asked = Asked()
     try:
         from cubestack.host.cli.main import main as run
 
-        return run(on_start=lambda: signal.signal(signal.SIGINT, before))
+        status = run(on_start=lambda: signal.signal(signal.SIGINT, asked.interrupt))
+        return INTERRUPTED if status and asked.once else status
     except KeyboardInterrupt:
         return INTERRUPTED
+    except Exception:
+        if asked.once:
+            return INTERRUPTED
+        raise
     finally:
         signal.signal(signal.SIGINT, _end)  # a second one while the interpreter ends
+
+
+class Asked:
+    """Whether Ctrl-C came: Python hides it behind another error where it comes while a module's
+    classes are made (``type.__new__`` raises RuntimeError for any error in ``__set_name__``)."""
+
+    def __init__(self) -> None:
+        self.once = False
+
+    def interrupt(self, _number: int, _frame: FrameType | None) -> None:
+        self.once = True
+        raise KeyboardInterrupt
 
 
 def deliver_again(lost: "sys.UnraisableHookArgs") -> None:

@@ -5,12 +5,14 @@ import shutil
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from threading import Event
 from types import SimpleNamespace
 
 import pytest
 
+from cubestack.host.cli import start
 from cubestack.host.cli.start import deliver_again
 from tests.tiers import quick
 
@@ -89,3 +91,30 @@ def test_ctrl_c_ends_the_command_in_order(words: str, after_s: float, tmp_path: 
             assert process.returncode in ((0,) if ends_well else (130, -signal.SIGINT)), said
     assert "Traceback" not in said
     assert "KeyboardInterrupt" not in said
+
+
+@pytest.mark.parametrize("hides", ["raises", "returns 2"])
+def test_ctrl_c_that_another_error_hides_ends_with_its_status(
+    hides: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def run(on_start: Callable[[], object]) -> int:
+        on_start()
+        try:
+
+            class Named:
+                def __set_name__(self, _owner: type, _name: str) -> None:
+                    signal.raise_signal(signal.SIGINT)
+
+            type("Owner", (), {"member": Named()})
+        except RuntimeError:
+            if hides == "raises":
+                raise
+        return 2
+
+    monkeypatch.setattr("cubestack.host.cli.main.main", run)
+    monkeypatch.setattr(sys, "unraisablehook", sys.unraisablehook)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        assert start.main() == start.INTERRUPTED
+    finally:
+        signal.signal(signal.SIGINT, before)
