@@ -3,7 +3,7 @@
 CubeStar thesis, section 3.2 (the part). Operations cost their cycles as compiled code on the
 simulated part; the thesis' compiler and its options are not published. The
 transfer loop is the only entry fitted to a published duration (table 6.2). Of that table nothing is
-a prediction but processing: capture follows from the frame rate, the discard delay is a setting,
+a prediction: capture and processing follows from the frame rate, the discard delay is a setting,
 and idle is the rest of the second.
 
 The file of measurements, build by build, is written by `cubestack costs measure --write`: each
