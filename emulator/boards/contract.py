@@ -43,6 +43,9 @@ class UartLink(Protocol):
 class NodeLink(UartLink, I2cTarget, Protocol):
     """A program's interrupt handlers of the serial line and the I2C bus to the satellite."""
 
+    def uart_block(self, data: bytes) -> None:
+        """As ``uart_byte`` for each of ``data``; asked only where the link has a ``frame_end``."""
+
 
 class BoardOptions(TypedDict, total=False):
     """Keyword arguments that all boards accept; see ``Board``."""
@@ -229,6 +232,7 @@ class Board(ABC):
         """Connect the satellite's serial line and I2C bus to the handlers from ``link``."""
         line = self._serial_line(baud, link)
         line.frame_end = lambda: getattr(link(), "frame_end", None)
+        line.on_block = lambda data: link().uart_block(data)
         self.i2c_bus.attach(i2c_address, Forwarder(lambda: [link()]))
 
     def _serial_line(

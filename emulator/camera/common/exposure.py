@@ -122,7 +122,7 @@ def _stars(
     reach = optics.half_field_deg + scene.speed_deg_s * seconds / 2 + 1
     middle = _time_ps(optics, shutter, 0.5)
     boresight = matrix_from_quaternion(scene.truth(middle))[2]
-    near = sky.vectors @ boresight > math.cos(math.radians(min(reach, 180)))
+    near = sky.around(boresight, reach)
     vectors, rates = sky.vectors[near], optics.electrons_per_second(sky.v_mag[near])
     if scene.hazards:
         vectors, covered = _apparent_lights(scene, camera_state(scene, optics, shutter), vectors)

@@ -32,6 +32,7 @@ WIDEST_PSF_PX = 20.0
 """Largest standard deviation of a spot in px (assumed): few stars would still be visible."""
 
 Pixels = NDArray[np.float64]
+Numbers = NDArray[np.float64]
 
 
 class Distortion(Enum):
@@ -190,7 +191,7 @@ class Optics(DeclaredValues):
         directions = self.unproject(np.stack([x.ravel(), y.ravel()], axis=1))
         return self.transmission(directions).reshape(self.rows, self.columns).astype(np.float32)
 
-    @property
+    @cached_property
     def half_field_deg(self) -> float:
         """Angle between the boresight and the farthest corner of the sensor."""
         return float(np.degrees(np.arccos(self.unproject(self._corners)[:, 2].min())))
@@ -228,33 +229,41 @@ class Optics(DeclaredValues):
     def _polynomial(self, points: Pixels, sign: int) -> Pixels:
         """Equations 4.1.3 and 4.1.4 on normalised points, the coefficients times ``sign``."""
         x, y = points.T
+        across, down, _, _ = self._terms(x, y, sign)
+        return np.stack([across, down], axis=1)
+
+    def _terms(
+        self, x: Numbers, y: Numbers, sign: int
+    ) -> tuple[Numbers, Numbers, Numbers, Numbers]:
+        """The same of coordinates (n,), with the squared radius and the radial factor."""
         r2 = x * x + y * y
         radial = 1 + sign * r2 * (self.k1 + self.k2 * r2)
         p1, p2 = sign * self.p1, sign * self.p2
         across = x * radial + p2 * (r2 + 2 * x * x) + 2 * p1 * x * y
         down = y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
-        return np.stack([across, down], axis=1)
+        return across, down, r2, radial
 
     @np.errstate(all="ignore")  # a search that does not converge may leave the range of numbers
     def _inverse_polynomial(self, targets: Pixels, sign: int) -> Pixels:
         """Points that ``_polynomial`` maps to ``targets``, by Newton's method; NaN if none."""
-        points = targets.copy()
+        wanted_x, wanted_y = np.ascontiguousarray(targets.T)
+        x, y = wanted_x.copy(), wanted_y.copy()
         p1, p2 = sign * self.p1, sign * self.p2
         for _ in range(20):
-            x, y = points.T
-            r2 = x * x + y * y
-            radial = 1 + sign * r2 * (self.k1 + self.k2 * r2)
+            across, down, r2, radial = self._terms(x, y, sign)
             slope = 2 * sign * (self.k1 + 2 * self.k2 * r2)  # of radial, by r2, doubled
             jxx = radial + slope * x * x + 6 * p2 * x + 2 * p1 * y
             jyy = radial + slope * y * y + 6 * p1 * y + 2 * p2 * x
             jxy = slope * x * y + 2 * p2 * y + 2 * p1 * x
-            ex, ey = (self._polynomial(points, sign) - targets).T
+            ex, ey = across - wanted_x, down - wanted_y
             determinant = jxx * jyy - jxy * jxy
-            step = np.stack([jyy * ex - jxy * ey, jxx * ey - jxy * ex], axis=1)
-            step /= determinant[:, None]
-            points -= step
-            found = np.abs(step).max(axis=1) < 1e-14
+            step_x = (jyy * ex - jxy * ey) / determinant
+            step_y = (jxx * ey - jxy * ex) / determinant
+            x -= step_x
+            y -= step_y
+            found = np.maximum(np.abs(step_x), np.abs(step_y)) < 1e-14
             if found.all():
-                return points
+                return np.stack([x, y], axis=1)
+        points = np.stack([x, y], axis=1)
         points[~found] = np.nan
         return points

@@ -9,12 +9,13 @@ from enum import Enum, auto
 ESCAPE = 0x1F
 START = 0x7F
 END = 0xFF
+FRONT, BACK = bytes((ESCAPE, START)), bytes((ESCAPE, END))
 
 
 def encode_frame(payload: bytes) -> bytes:
     """The frame with ``payload``, which may be empty."""
     escaped = payload.replace(bytes((ESCAPE,)), bytes((ESCAPE, ESCAPE)))
-    return bytes((ESCAPE, START)) + escaped + bytes((ESCAPE, END))
+    return FRONT + escaped + BACK
 
 
 class FrameEvent(Enum):
@@ -66,6 +67,22 @@ class FrameDecoder:
             return FrameEvent.PROTOCOL_ERROR
         self.payload = bytes(self._buffer[: self._max_length])
         return FrameEvent.TOO_LONG if len(self._buffer) > self._max_length else FrameEvent.FRAME
+
+    def takes(self, block: bytes) -> bool:
+        """Whether ``block`` is one frame without escapes in it, outside of another; then its
+        payload is in ``payload``, and ``feed`` of each byte would have done the same."""
+        payload = block[2:-2]
+        whole = (
+            len(payload) <= self._max_length
+            and not self.unfinished
+            and block[:2] == FRONT
+            and block[-2:] == BACK
+            and ESCAPE not in payload
+            and len(block) >= len(FRONT) + len(BACK)
+        )
+        if whole:
+            self.payload = payload
+        return whole
 
     @property
     def open_payload(self) -> bytes | None:

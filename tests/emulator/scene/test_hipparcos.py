@@ -127,3 +127,13 @@ def test_rejects_a_different_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         load_sky()
     monkeypatch.undo()
     hipparcos._catalogue.cache_clear()
+
+
+@pytest.mark.parametrize("reach_deg", [0.0, 3.0, 21.0, 90.0, 179.9, 180.0])
+def test_stars_around_a_direction_are_those_of_the_whole_sky(reach_deg: float) -> None:
+    sky, rng = load_sky(mag_limit=6.0), np.random.default_rng(7)
+    poles = [np.array([0.0, 0.0, sign]) for sign in (1, -1)]
+    for direction in (*poles, *(v / np.linalg.norm(v) for v in rng.standard_normal((30, 3)))):
+        cosines = sky.vectors @ direction
+        wanted = np.flatnonzero(cosines > np.cos(np.radians(reach_deg)))
+        np.testing.assert_array_equal(sky.around(direction, reach_deg), wanted)

@@ -354,3 +354,23 @@ def test_after_a_silence_no_good_frame_is_lost(name: str, parts: list[bytes]) ->
     unit.run()
     unit.received()
     assert unit.frames(good(node)) == ack(AckError.OK)
+
+
+@given(
+    name=st.sampled_from(list(NODES)),
+    front=st.sampled_from([b"", b"\x1f", b"\x1f\x7f\x01", b"\x55"]),
+    payload=st.binary(max_size=6),
+)
+def test_a_block_of_bytes_does_what_each_byte_would(
+    name: str, front: bytes, payload: bytes
+) -> None:
+    one, other = NODES[name].make(), NODES[name].make()
+    blocks = [front, encode_frame(payload)]
+    for byte in b"".join(blocks):
+        one.link.uart_byte(byte)
+    for block in blocks:
+        other.link.uart_block(block)
+    assert other.received() == one.received()
+    assert other.state.flags == one.state.flags
+    assert other.meter.counts == one.meter.counts
+    assert other.meter.total == one.meter.total

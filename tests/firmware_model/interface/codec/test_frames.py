@@ -102,3 +102,20 @@ def test_silence_reports_unfinished_frame(received: str, unfinished: bool) -> No
     events(decoder, bytes.fromhex(received))
     assert decoder.reset() is unfinished
     assert decoder.reset() is False
+
+
+@given(NOISE, st.one_of(PAYLOAD.map(encode_frame), NOISE, st.just(encode_frame(bytes(LIMIT + 1)))))
+def test_a_frame_taken_whole_leaves_what_its_bytes_would(noise: bytes, block: bytes) -> None:
+    whole, by_bytes = FrameDecoder(LIMIT), FrameDecoder(LIMIT)
+    events(whole, noise)
+    events(by_bytes, noise)
+    if whole.takes(block):
+        assert events(by_bytes, block) == [whole.payload]
+    else:
+        events(whole, block), events(by_bytes, block)
+    assert events(whole, noise) == events(by_bytes, noise)
+
+
+@given(PAYLOAD)
+def test_a_frame_without_escapes_is_taken_whole(payload: bytes) -> None:
+    assert FrameDecoder(LIMIT).takes(encode_frame(payload)) == (0x1F not in payload)
