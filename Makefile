@@ -123,6 +123,7 @@ FIGURES ?=
 
 fidelity: .venv/ready-dev
 	@OPENBLAS_NUM_THREADS=1 $(BIN)/cubestack fidelity $(FIGURES) --write
+	@OPENBLAS_NUM_THREADS=1 $(BIN)/cubestack hazards $(FIGURES) --frames 12 --seed 1 --out docs
 
 bench: .venv/ready-run
 	@$(BIN)/cubestack bench

@@ -49,6 +49,7 @@ OWN = {
     "host/studies/cubestar/demo.py": "our package",
     "host/studies/fidelity/command.py": "our documents",
     "host/studies/fidelity/recorded.py": "our documents",
+    "host/studies/fidelity/text.py": "our documents",
     "host/studies/fidelity/table.py": "our package",
     "host/studies/hazards/command.py": "our documents",
     "host/studies/rows/record.py": "our documents",

@@ -1,8 +1,8 @@
 """The star catalogue in CubeStar's flash, compiled from the sky.
 
-CubeStar thesis, section 4.3.2. The published number of pairs corresponds to a pair limit of 42.1
-degrees; the default here is the true diagonal of the calibrated camera, including distortion, which
-solves more images (docs/fidelity.md compares both).
+CubeStar thesis, section 4.3.2. A pair limit of 42.1 degrees gives 11 483 pairs, one less than
+section 5.3.2 has; the default here is the true diagonal of the calibrated camera, including
+distortion, which solves more images (docs/fidelity.md compares both).
 
 The published 405 stars are the 406 of Hipparcos without alpha Centauri B, which is 0.0001 rad from
 A: the list omits stars that close. The thesis' list must omit it too: its closest two pairs are
@@ -18,7 +18,7 @@ from cubestack.emulator.scene.hipparcos import DEFAULT_EPOCH, load_sky
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 
 MAG_LIMIT = 3.8  # chosen, as published
-PAIR_LIMIT_DEG = 57.3  # chosen; the published number of pairs fixes 42.1
+PAIR_LIMIT_DEG = 57.3  # chosen; the published number of pairs fixes 42.101
 
 
 @lru_cache(maxsize=4)

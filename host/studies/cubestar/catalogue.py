@@ -2,7 +2,7 @@
 
 examples:
   cubestack catalogue cubestar                         as flown: V < 3.8
-  cubestack catalogue cubestar --pair-limit 42.1       the published number of pairs
+  cubestack catalogue cubestar --pair-limit 42.1       one pair less than published
   cubestack catalogue cubestar --mag-limit 4 --json
   cubestack catalogue cubestar --c catalogue.c         star list and pair list as C arrays
 """

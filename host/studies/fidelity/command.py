@@ -27,7 +27,7 @@ from cubestack.firmware_model.values import whole
 from cubestack.host.cli.arguments import add_flag, add_value
 from cubestack.host.devices.registry import devices
 from cubestack.host.output import write_output
-from cubestack.host.studies.fidelity import recorded
+from cubestack.host.studies.fidelity import recorded, text
 from cubestack.host.studies.fidelity import table as fidelity
 from cubestack.host.studies.workers import cores
 from cubestack.host.terminal import busy, say, tell
@@ -74,11 +74,14 @@ def run(args: argparse.Namespace) -> int:
     profiles = [args.profile] if args.profile else PROFILES
     for name in names if args.write else ():
         _check_pages(args.write, name)
+    trials = {name: [row.trial for _, row in rows] for name, rows in chosen.items()}
+    if (args.write or args.stale) and not args.rows:  # also those of figures without rows
+        trials = {name: list(fidelity.fidelity_of(name).trials) for name in names}
     jobs = [
         job
-        for name, rows in chosen.items()
+        for name in names
         for job in fidelity.jobs_of(
-            name, (row for _, row in rows), profiles, quick=args.quick, frames=args.frames
+            name, trials[name], profiles, quick=args.quick, frames=args.frames
         )
     ]
     if args.stale:
@@ -87,7 +90,8 @@ def run(args: argparse.Namespace) -> int:
         jobs = [job for job in jobs if job in reasons]
         for job in jobs:
             keys = ", ".join(row.key for row in recorded.rows_of(job))
-            tell(f"{job.device}, {job.key}: rows {keys}: {reasons[job]}")
+            rows = f" rows {keys}:" if keys else ""
+            tell(f"{job.device}, {job.key}:{rows} {reasons[job]}")
         if not args.write:
             return 1 if jobs else 0
     if args.write:
@@ -103,7 +107,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _write(args: argparse.Namespace, jobs: list[fidelity.Job], names: list[str]) -> None:
-    """Renew the jobs' measurements, then the pages."""
+    """Renew the jobs' measurements, then the pages' tables and the figures in their text."""
     if jobs:
         told = _Rest(jobs, quiet=False)
         with busy("measuring") as shown:
@@ -114,9 +118,12 @@ def _write(args: argparse.Namespace, jobs: list[fidelity.Job], names: list[str])
             for difference in done:
                 say(difference)
     for name in names:
-        for path, text in recorded.pages(args.write, name).items():
-            write_output(path, text)
+        for path, page in recorded.pages(args.write, name).items():
+            write_output(path, page)
             say(f"wrote the rows of {name} in {path}")
+    stored = text.stored_in(args.write)
+    for path in text.pages_with_figures(args.write):
+        write_output(path, text.filled(path, stored))
 
 
 class _Rest:
@@ -145,8 +152,8 @@ def _check_pages(folder: Path, name: str) -> None:
     declared = fidelity.fidelity_of(name)
     for table in declared.tables:
         path: Path = folder / declared.page_of(table)
-        text = path.read_text("utf-8") if path.is_file() else ""
-        if not all(mark in text for mark in fidelity.marks(table)):
+        page = path.read_text("utf-8") if path.is_file() else ""
+        if not all(mark in page for mark in fidelity.marks(table)):
             raise ValueError(f"{path} has no {fidelity.marks(table)[0].strip()}, or is not there")
 
 

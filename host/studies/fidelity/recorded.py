@@ -1,6 +1,6 @@
 """Rows of the pages from stored measurements, and which of these are no longer true."""
 
-import time
+import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -18,20 +18,20 @@ from cubestack.host.studies.fidelity.table import (
     rewritten,
     shown,
 )
+from cubestack.host.studies.fidelity.text import FOLDER
 from cubestack.host.studies.rows.record import Measurement, load, measurement, save
 from cubestack.host.studies.rows.trace import Trace
+from cubestack.host.studies.rows.trial import Figures
 from cubestack.host.studies.workers import performed_afresh
-
-FOLDER = "data"
-"""Of the documentation: measurements of each device in a file."""
 
 
 def record_file(docs: Path, device: str) -> Path:
+    """Measurements of a device."""
     return docs / FOLDER / f"{device}.json"
 
 
 def all_jobs(device: str) -> list[Job]:
-    return jobs_of(device, fidelity_of(device).rows)
+    return jobs_of(device, fidelity_of(device).trials)
 
 
 def rows_of(job: Job) -> list[Row]:
@@ -42,13 +42,18 @@ def rows_of(job: Job) -> list[Row]:
 def measured_anew(job: Job) -> Measurement:
     """Run a job in this process, which must be a new one: first a few frames, to see what runs."""
     trial, trace = fidelity_of(job.device).trials[job.trial], Trace()
-    started = time.process_time()
+    started = _spent_s()
     with trace.running():
         figures = perform(replace(job, frames=trial.quick))
     if job.frames:
-        started = time.process_time()
+        started = _spent_s()
         figures = perform(job)
-    return measurement(trial.call, time.process_time() - started, figures, trace.entries())
+    return measurement(trial.call, _spent_s() - started, figures, trace.entries())
+
+
+def _spent_s() -> float:
+    """Processor time of this process and of its ended copies."""
+    return sum(os.times()[:4])
 
 
 def renewed(
@@ -62,19 +67,27 @@ def renewed(
     for job, found in performed_afresh(measured_anew, order, workers):
         path = record_file(docs, job.device)
         stored = load(path)
-        yield from _differences(job, stored.get(job.key), found)
+        if job.key in stored:
+            yield from differences(job, stored[job.key].figures, found.figures)
         known = {one.key for one in all_jobs(job.device)}
         save(path, {key: one for key, one in stored.items() if key in known} | {job.key: found})
         on_done(job)
 
 
-def _differences(job: Job, was: Measurement | None, found: Measurement) -> Iterator[str]:
-    if was is None or was.figures.keys() != found.figures.keys():
+def differences(job: Job, was: Figures, found: Figures) -> Iterator[str]:
+    """What a job's rows, or its figures in the text of pages, show otherwise."""
+    if was.keys() != found.keys():
+        yield f"{job.device} {job.key}: other figures"
         return
-    for row in rows_of(job):
-        old, new = shown(row, was.figures), shown(row, found.figures)
+    rows = rows_of(job)
+    for row in rows:
+        old, new = shown(row, was), shown(row, found)
         if old != new:
             yield f"{job.device} {row.key}, {job.profile}: {old} is now {new}"
+    for name in was if not rows else ():
+        old, new = f"{was[name]:.6g}", f"{found[name]:.6g}"
+        if old != new:
+            yield f"{job.device} {job.key}, {name}: {old} is now {new}"
 
 
 def stale(docs: Path, devices: Iterable[str]) -> dict[Job, str]:

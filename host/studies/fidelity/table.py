@@ -42,7 +42,8 @@ class Fidelity:
     """All published figures of a device."""
 
     page: str  #: file of the documentation that has the tables
-    trials: Mapping[str, Trial]  #: by name
+    #: by name; those without rows are for figures within the text of pages
+    trials: Mapping[str, Trial]
     #: rows by the name of the table in the page, in its order
     tables: Mapping[str, tuple[Row, ...]]
     elsewhere: Mapping[str, str] = field(default_factory=dict)  #: files of tables that have another
@@ -149,20 +150,21 @@ def chosen_rows(device: str, patterns: Sequence[str] = ()) -> list[tuple[str, Ro
 
 def jobs_of(
     device: str,
-    rows: Iterable[Row],
+    names: Iterable[str],
     profiles: Sequence[str] = PROFILES,
     *,
     quick: bool = False,
     frames: int | None = None,
 ) -> list[Job]:
-    """Jobs for these rows; ``frames`` replaces a trial's own number."""
+    """Jobs for these trials; ``frames`` replaces a trial's own number."""
     declared = fidelity_of(device)
     jobs = []
-    for name in dict.fromkeys(row.trial for row in rows):
+    for name in dict.fromkeys(names):
         trial = declared.trials[name]
         whole = trial.frames
         count = whole and (frames or (trial.quick if quick else whole))
-        for profile in profiles if trial.profiles else profiles[:1]:
+        both = profiles if trial.profiles else profiles[:1]
+        for profile in [trial.profile] if trial.profile else both:
             share = count / whole if whole else 1.0
             jobs.append(Job(device, name, profile, count, trial.seconds * share))
     return jobs

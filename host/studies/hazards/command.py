@@ -6,7 +6,8 @@ Results do not depend on the number of workers.
 
 examples:
   cubestack hazards {first} --hazard moon --frames 20
-  cubestack hazards --frames 40 --out docs                all, and the page that shows them
+  cubestack hazards --frames 12 --seed 1 --out docs       all, and the page that shows them
+  cubestack hazards --frames 12 --seed 1 --stale          name the curves whose code changed
   cubestack hazards {first} --json > points.jsonl
   cubestack hazards --list                                list hazards and their strengths
 """
@@ -38,7 +39,7 @@ from cubestack.host.pictures.images import save_sample
 from cubestack.host.studies.hazards import curves, recorded
 from cubestack.host.studies.hazards.curves import Point
 from cubestack.host.studies.workers import cores
-from cubestack.host.terminal import progress, say, show
+from cubestack.host.terminal import progress, say, show, tell
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -60,6 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "write hazards.md there, or a part of it, with pictures, curves and points",
         "FOLDER",
     )
+    add_flag(parser, "--stale", "name curves whose code changed since; with --out, only those")
     add_flag(parser, "--json", "print one JSON object per point")
 
 
@@ -76,9 +78,18 @@ def run(args: argparse.Namespace) -> int:
     ]
     if args.out:
         check_page(args.out)
+    every = recorded.curves_of(jobs)
+    if args.stale:
+        reasons = recorded.stale(args.out or Path("docs"), every)
+        every = list(reasons)
+        for curve, reason in reasons.items():
+            tell(f"{recorded.key(curve[0])}: {reason}")
+        if not (args.out and every):
+            return 1 if every else 0
+        jobs = [job for curve in every for job in curve]
     workers = min(args.workers or cores(), len(jobs))
     points = []
-    found = recorded.renewed(args.out, jobs, workers) if args.out else curves.run(jobs, workers)
+    found = recorded.renewed(args.out, every, workers) if args.out else curves.run(jobs, workers)
     for point in progress(found, len(jobs), "measuring", quiet=args.json):
         points.append(point)
         if args.json:

@@ -1,7 +1,7 @@
 """Measurements of hazards for the page, stored with the code that they depend on."""
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -52,19 +52,30 @@ def figures(points: Sequence[Point]) -> dict[str, float]:
     }
 
 
-def renewed(docs: Path, jobs: Sequence[Job], workers: int) -> Iterator[Point]:
-    """Measure all curves of the jobs and store each as it ends."""
-    curves: dict[str, list[Job]] = {}
+def curves_of(jobs: Iterable[Job]) -> list[Curve]:
+    found: dict[str, list[Job]] = {}
     for job in jobs:
-        curves.setdefault(key(job), []).append(job)
-    every = [tuple(curve) for curve in curves.values()]
-    for curve, (points, found) in performed_afresh(measured_anew, every, workers):
+        found.setdefault(key(job), []).append(job)
+    return [tuple(curve) for curve in found.values()]
+
+
+def renewed(docs: Path, curves: Sequence[Curve], workers: int) -> Iterator[Point]:
+    """Measure the curves and store each as it ends."""
+    for curve, (points, found) in performed_afresh(measured_anew, curves, workers):
         path = record_file(docs)
         save(path, load(path) | {key(curve[0]): found})
         yield from points
 
 
-def stale(docs: Path) -> dict[str, list[str]]:
-    """Stored curves whose code has changed, with the files."""
-    stored = load(record_file(docs))
-    return {name: one.changed for name, one in stored.items() if one.changed}
+def stale(docs: Path, curves: Iterable[Curve]) -> dict[Curve, str]:
+    """Curves whose stored measurement is missing or of other code, each with the reason."""
+    stored, found = load(record_file(docs)), dict[Curve, str]()
+    for curve in curves:
+        one = stored.get(key(curve[0]))
+        if one is None:
+            found[curve] = "never measured"
+        elif one.call != call(curve):
+            found[curve] = f"it was {one.call}"
+        elif one.changed:
+            found[curve] = f"changed since: {', '.join(one.changed)}"
+    return found

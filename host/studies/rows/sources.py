@@ -143,7 +143,8 @@ def _uses(each: Name, *, ran: bool) -> Iterator[Name]:
     """Definitions that the statements of a name use.
 
     A function that ran uses no other functions: those ran as well, or were not called. What defines
-    a constant was executed by an import, with the functions that it calls.
+    a constant was executed by an import, with the functions that it calls. A function that reads
+    the source of a module, for the name of a file in the cache, uses all that the module defines.
     """
     file, name = each
     own = source(file)
@@ -152,7 +153,10 @@ def _uses(each: Name, *, ran: bool) -> Iterator[Name]:
         yield file, holder
     for statement in own.defined[name]:
         for node in _walk(statement, methods=isinstance(statement, _FUNCTIONS)):
-            if isinstance(node, ast.Name) and node.id in own.defined:
+            whole = _whole_module(own, node, file) if ran else None
+            if whole is not None:
+                yield from ((whole, each) for each in source(whole).defined)
+            elif isinstance(node, ast.Name) and node.id in own.defined:
                 if not (ran and own.is_function(node.id)):
                     yield file, node.id
             elif isinstance(node, ast.Name) and node.id in own.imported:
@@ -167,6 +171,16 @@ def _attribute(own: Source, node: ast.AST, *, functions: bool) -> Iterator[Name]
         imported = own.imported.get(node.value.id)
         if imported is not None:
             yield from _declaration(".".join(imported), node.attr, functions=functions)
+
+
+def _whole_module(own: Source, node: ast.AST, file: str) -> str | None:
+    """The module whose ``__file__`` this is."""
+    if isinstance(node, ast.Name) and node.id == "__file__":
+        return file
+    if not (isinstance(node, ast.Attribute) and node.attr == "__file__"):
+        return None
+    imported = own.imported.get(node.value.id) if isinstance(node.value, ast.Name) else None
+    return module_file(".".join(imported)) if imported else None
 
 
 def _walk(node: ast.AST, *, methods: bool = True) -> Iterator[ast.AST]:

@@ -27,6 +27,7 @@ class Trial:
     #: arguments of `cubestack` that show it; empty if only `fidelity DEVICE --rows KEY` does
     command: str = ""
     profiles: bool = True  #: whether the profile matters
+    profile: str = ""  #: the only one of interest, if so
 
     @property
     def call(self) -> str:
@@ -56,6 +57,7 @@ def measured(
     seed: int = 1,
     units: int = 1,
     extremes: tuple[str, ...] = (),
+    profile: str = "",
     **options: Any,
 ) -> Trial:
     """A trial of `cubestack measure`: ``summary`` computes figures of its results.
@@ -67,11 +69,11 @@ def measured(
     how = {"device": device, "summary": summary, "seed": seed, "units": units}
     run = partial(_measured, **how, extremes=extremes, options=options)  # type: ignore[arg-type]
     if units > 1:
-        return Trial(run, frames, quick, seconds)
+        return Trial(run, frames, quick, seconds, profile=profile)
     words = ["measure", device, "--frames", str(frames), "--seed", str(seed)]
     for name, value in options.items():
         words += [option_string(name)] if value is True else [option_string(name), str(value)]
-    return Trial(run, frames, quick, seconds, " ".join(words))
+    return Trial(run, frames, quick, seconds, " ".join(words), profile=profile)
 
 
 def _measured(

@@ -9,8 +9,15 @@ import pytest
 
 from cubestack.emulator.native.compiler import find_compiler
 from cubestack.host.devices.registry import BUILT_IN
-from cubestack.host.studies.fidelity.recorded import all_jobs, pages, record_file, rows_of, stale
-from cubestack.host.studies.fidelity.table import Job, fidelity_of, perform, shown
+from cubestack.host.studies.fidelity.recorded import (
+    all_jobs,
+    differences,
+    pages,
+    record_file,
+    rows_of,
+    stale,
+)
+from cubestack.host.studies.fidelity.table import Job, fidelity_of, perform
 from cubestack.host.studies.rows.record import load, save
 from tests.conftest import Run
 
@@ -24,7 +31,7 @@ compiled = pytest.mark.skipif(find_compiler() is None, reason="needs the compile
 
 def test_every_row_was_measured_with_the_present_code() -> None:
     found = [
-        f"{job.device} {', '.join(row.key for row in rows_of(job))} ({job.profile}): {reason}"
+        f"{job.device} {', '.join([job.key, *(row.key for row in rows_of(job))])}: {reason}"
         for job, reason in stale(DOCS, BUILT_IN).items()
     ]
     assert not found, "\n".join(["`make fidelity FIGURES=--stale` measures anew:", *found])
@@ -63,9 +70,7 @@ def by_cost(least_s: float, most_s: float) -> list[Job]:
 
 def check(job: Job) -> None:
     stored = load(record_file(DOCS, job.device))[job.key].figures
-    found = perform(job)
-    for row in rows_of(job):
-        assert shown(row, found) == shown(row, stored), f"{job.device} {row.key}, {job.profile}"
+    assert not list(differences(job, stored, perform(job)))
 
 
 @compiled

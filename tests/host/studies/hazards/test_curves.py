@@ -1,5 +1,6 @@
 import json
 import re
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -20,7 +21,7 @@ from cubestack.host.studies.hazards.curves import (
     jobs_of,
 )
 from cubestack.host.studies.hazards.curves import run as run_jobs
-from cubestack.host.studies.rows.record import load
+from cubestack.host.studies.rows.record import load, measurement, save
 from tests.conftest import Run
 
 
@@ -91,12 +92,47 @@ def test_page_numbers_match_the_points() -> None:
         assert row in page
 
 
-def test_stored_curves_are_of_the_present_code_and_those_of_the_page() -> None:
-    assert not recorded.stale(DOCS), "`make fidelity` measures them anew"
+FRAMES, SEED = 12, 1
+"""Of the curves of the page."""
+
+
+def curves_of(name: str) -> list[recorded.Curve]:
+    return recorded.curves_of(jobs_of(name, [], FRAMES, SEED, "extended"))
+
+
+def test_curves_were_measured_with_the_present_code() -> None:
+    every = [curve for name in devices_with_hazards() for curve in curves_of(name)]
+    found = [f"{recorded.key(one[0])}: {why}" for one, why in recorded.stale(DOCS, every).items()]
+    found = [one for one in found if not one.endswith("never measured")]
+    assert not found, "\n".join(["`make fidelity FIGURES=--stale` measures anew:", *found])
+
+
+def test_curves_of_the_page_are_the_stored_ones() -> None:
     lines = (DOCS / PICTURES / "points.jsonl").read_text("utf-8").splitlines()
     points = [Point(**json.loads(line)) for line in lines]
     for name, stored in load(recorded.record_file(DOCS)).items():
         assert recorded.figures([p for p in points if recorded.key(p) == name]) == stored.figures
+
+
+def test_stale_curves_are_named(tmp_path: Path, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    first, second, *_ = curves_of("aramis")
+    now = measurement(recorded.call(first), 1.0, {}, [])
+    save(
+        recorded.record_file(tmp_path / "docs"),
+        {
+            recorded.key(first[0]): replace(now, depends=("host/devices/device.py 0000000000",)),
+            recorded.key(second[0]): measurement("hazards --frames 3", 1.0, {}, []),
+        },
+    )
+    names = ("--hazard", first[0].hazard, "--hazard", second[0].hazard, "--hazard", "wobble")
+    found = run("hazards", "aramis", *names, "--frames", FRAMES, "--seed", SEED, "--stale")
+    assert found.code == 1
+    assert found.out.splitlines() == [
+        f"aramis {first[0].hazard}: changed since: host/devices/device.py",
+        f"aramis {second[0].hazard}: it was hazards --frames 3",
+        "aramis wobble: never measured",
+    ]
 
 
 @pytest.mark.slow

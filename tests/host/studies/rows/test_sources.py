@@ -47,6 +47,10 @@ def another():
     return 1
 
 
+def cached():
+    return limits.__file__
+
+
 class Kept:
     share = 0.5
 
@@ -134,3 +138,16 @@ def test_sources_in_c_count_with_the_module_beside_them(change: Change, tmp_path
 def test_missing_file_has_an_empty_digest(change: Change) -> None:
     assert sources.digest("emulator/none.json") == ""
     assert sources.digest("emulator/none.py:NAME") == ""
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "counts"),
+    [("emulator/limits.py", "OTHER = 5", True), ("host/studies/study.py", "return 1", False)],
+)
+def test_a_function_that_reads_a_source_depends_on_all_of_it(
+    change: Change, file: str, old: str, counts: bool
+) -> None:
+    entries = sources.entries({(SHOWN[0], "cached")}, ())
+    before = digests(entries)
+    change(file, old, old[:-1] + "9")
+    assert (digests(entries) != before) == counts
