@@ -1,11 +1,14 @@
-"""Which cases of a parametrised test are quick, and which are slow."""
+"""Which cases of a parametrised test are quick, which are slow, and which are today's."""
 
 from collections.abc import Iterable
+from datetime import UTC, datetime
 from typing import Any
 
 import pytest
 
 PARAM = type(pytest.param())
+
+DAY = datetime.now(UTC).toordinal()
 
 
 def quick(cases: Iterable[Any], count: int) -> list[Any]:
@@ -21,6 +24,15 @@ def quick(cases: Iterable[Any], count: int) -> list[Any]:
 def quick_ones(cases: Iterable[Any], *names: str) -> list[Any]:
     """All cases; all but the named ones are marked slow."""
     return [case if case in names else _slow(case) for case in cases]
+
+
+def todays(turn: int, turns: int, cases: int) -> int:
+    """Number of the case that a test runs as its ``turn`` of ``turns``, of 0 to ``cases`` - 1.
+
+    The cases of a day are evenly spread. Each day has others, until every one has been run.
+    """
+    days = -(-cases // turns)
+    return turn * days + DAY % min(days, cases - turn * days)
 
 
 def _slow(case: Any) -> Any:

@@ -14,7 +14,7 @@ import pytest
 
 from cubestack.host.cli import start
 from cubestack.host.cli.start import deliver_again
-from tests.tiers import quick
+from tests.tiers import quick_ones, todays
 
 SCRIPT = Path(__file__).parents[3] / "host" / "cli" / "cubestack"
 ENV = {**os.environ, "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
@@ -32,14 +32,9 @@ COMMANDS = (
     "catalogue cubestar",
     "hdl area cubestar",
 )
-MOMENTS = 50
-
-CASES = [
-    (words, moment / MOMENTS * last_s)
-    for words in COMMANDS
-    for last_s in (0.4 if words.startswith("-") else 1.5,)
-    for moment in range(MOMENTS)
-]
+MOMENTS, TURNS = 50, 4
+CASES = [(words, turn) for words in COMMANDS for turn in range(TURNS)]
+QUICK = [(words, at % TURNS) for at, words in enumerate(COMMANDS) if at % 2]
 
 
 def test_ctrl_c_in_a_finalizer_is_not_lost() -> None:
@@ -62,8 +57,11 @@ def _can_block() -> bool:
 
 
 @pytest.mark.skipif(not _can_block(), reason="this env can not block signals")
-@pytest.mark.parametrize(("words", "after_s"), quick(CASES, 10))
-def test_ctrl_c_ends_the_command_in_order(words: str, after_s: float, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("words", "turn"), quick_ones(CASES, *QUICK))
+def test_ctrl_c_ends_the_command_in_order(words: str, turn: int, tmp_path: Path) -> None:
+    last_s = 0.4 if words.startswith("-") else 1.5
+    after_s = todays(turn, TURNS, MOMENTS) / MOMENTS * last_s
+    print(f"after {after_s} s")
     call = [SCRIPT, *words.split()]
     pipe = subprocess.PIPE
     with subprocess.Popen(
