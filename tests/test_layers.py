@@ -90,24 +90,23 @@ def name_of(path: Path) -> str:
 @cache
 def imported(path: Path) -> tuple[tuple[str, bool], ...]:
     """Names that a module imports, and whether at load time."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    lazy = {
-        id(node)
-        for block in ast.walk(tree)
-        if isinstance(block, ast.FunctionDef | ast.AsyncFunctionDef)
-        or (isinstance(block, ast.If) and ast.unparse(block.test) == "TYPE_CHECKING")
-        for node in ast.walk(block)
-    }
-    names = []
-    for node in ast.walk(tree):
+    names = list[tuple[str, bool]]()
+
+    def walk(node: ast.AST, at_load: bool) -> None:
         if isinstance(node, ast.Import):
-            names += [(alias.name, id(node) not in lazy) for alias in node.names]
+            names.extend((alias.name, at_load) for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"{path}: imports are absolute here"
             for alias in node.names:
                 deeper = f"{node.module}.{alias.name}"
-                name = deeper if deeper in modules() else str(node.module)
-                names.append((name, id(node) not in lazy))
+                names.append((deeper if deeper in modules() else str(node.module), at_load))
+        elif not isinstance(node, ast.expr):  # which imports nothing
+            later = isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
+            later |= isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
+            for child in ast.iter_child_nodes(node):
+                walk(child, at_load and not later)
+
+    walk(ast.parse(path.read_text(encoding="utf-8")), True)
     return tuple(names)
 
 

@@ -163,7 +163,8 @@ def with_values(layouts: Iterable[Layout]) -> tuple[Layout, ...]:
 
     RegisterTableError if a field has more names than values.
     """
-    return tuple(_named(layout) for layout in layouts)
+    table = tuple(value_names())
+    return tuple(_named(layout, table) for layout in layouts)
 
 
 def value_names() -> Iterator[tuple[str, Values]]:
@@ -189,11 +190,11 @@ def _values(words: Iterable[str]) -> Iterator[tuple[int, str]]:
             number += 1
 
 
-def _named(layout: Layout) -> Layout:
+def _named(layout: Layout, table: Iterable[tuple[str, Values]]) -> Layout:
     prefix = f"{layout.name}."
     lines = [
         (pattern.partition(".")[2], values)
-        for pattern, values in value_names()
+        for pattern, values in table
         if fnmatchcase(prefix, pattern.partition(".")[0] + ".")
     ]
 
