@@ -22,6 +22,10 @@ LOADED = re.compile(
 )
 
 
+built = pytest.mark.slow
+"""Links and docstrings are tested quicker: tests/system/documents/test_pages.py, host/api."""
+
+
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Built with every link checked."""
@@ -33,6 +37,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@built
 def test_pages_load_nothing_from_other_hosts(site: Path) -> None:
     pages = sorted(site.rglob("*.html"))
     assert len(pages) > 40
@@ -50,6 +55,7 @@ def test_every_document_is_in_the_navigation() -> None:
     assert yaml.safe_load(text)["theme"]["font"] is False
 
 
+@built
 def test_commands_and_public_names_are_documented(site: Path) -> None:
     page = (site / "reference/commands.html").read_text(encoding="utf-8")
     subcommands = ("hdl-area", "hdl-wave", "measure-aramis", "calibrate-cubestar")
@@ -62,6 +68,7 @@ def test_commands_and_public_names_are_documented(site: Path) -> None:
         assert "\nNone\n</code>" not in names  # a docstring that is missing
 
 
+@built
 def test_site_search_works_from_the_file_system(site: Path, chromium: Any) -> None:
     page = chromium.new_page()
     page.goto(f"{(site / 'index.html').as_uri()}?q=pseudo-terminal")
@@ -70,12 +77,14 @@ def test_site_search_works_from_the_file_system(site: Path, chromium: Any) -> No
     page.close()
 
 
+@built
 def test_page_that_runs_in_the_browser_is_reached_and_leads_back(site: Path) -> None:
     assert 'href="try/index.html"' in (site / "try.html").read_text(encoding="utf-8")
     assert 'href="../try.html"' in (site / "try/index.html").read_text(encoding="utf-8")
     assert not (site / "try/board").exists()
 
 
+@built
 @pytest.mark.parametrize("name", DIAGRAMS)
 def test_diagrams_scroll_on_a_narrow_screen(site: Path, chromium: Any, name: str) -> None:
     page = chromium.new_page(viewport={"width": 390, "height": 800})

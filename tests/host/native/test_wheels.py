@@ -21,9 +21,24 @@ MUSL = "names musl"
 LIBRARIES = {"b-2.so": b"second", "a-1.so": b"first"}
 
 
-@pytest.fixture(scope="module")
-def pure(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
-    return wheels.pure_files(tmp_path_factory.mktemp("pure"))
+@pytest.fixture
+def pure(tmp_path: Path) -> tuple[Path, Path]:
+    """A small source distribution, and a wheel like that of setuptools."""
+    tree = tmp_path / "cubestack-1"
+    tree.mkdir()
+    (tree / "data.py").write_text("x = 1\n")
+    (tree / "setup.sh").write_text("true\n")
+    (tree / "setup.sh").chmod(0o755)
+    source, wheel = tmp_path / "cubestack-1.tar.gz", tmp_path / "cubestack-1-py3-none-any.whl"
+    with tarfile.open(source, "w:gz") as archive:
+        archive.add(tree, tree.name)
+    about = "cubestack-1.dist-info"
+    with zipfile.ZipFile(wheel, "w") as archive:
+        archive.writestr("cubestack/__init__.py", "")
+        archive.writestr(f"{about}/WHEEL", "Root-Is-Purelib: true\nTag: py3-none-any\n")
+        archive.writestr(f"{about}/METADATA", "Name: cubestack\nVersion: 1\n")
+        archive.writestr(f"{about}/RECORD", "cubestack/__init__.py,,\n")
+    return source, wheel
 
 
 @pytest.fixture
@@ -49,9 +64,9 @@ def test_wheel_contains_the_libraries_and_records_them(wheel: Path) -> None:
     assert line == f"{folder}/a-1.so,sha256=p5N7ZLjKpY8Dchu2us9ceMsjX-vg5wsbhM2ZVBRhoI4,5"
 
 
-def test_pip_installs_the_packed_wheel_with_its_libraries(
-    pure: tuple[Path, Path], tmp_path: Path
-) -> None:
+@pytest.mark.slow
+def test_pip_installs_the_packed_wheel_with_its_libraries(tmp_path: Path) -> None:
+    pure = wheels.pure_files(tmp_path)
     tag = f"linux_{wheels.os.uname().machine}"  # of this machine, whatever it is
     wheel = wheels.packed_wheel(pure[1], tag, LIBRARIES, tmp_path)
     venv.create(tmp_path / "venv", with_pip=False)
