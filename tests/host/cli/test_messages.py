@@ -131,6 +131,7 @@ def test_signal_removes_the_pty_link(number: signal.Signals, tmp_path: Path) -> 
     link = tmp_path / "tty"
     with begun("serves on", "emulate", "cubestar", "--pty", str(link)) as process:
         assert link.is_symlink()
+        assert link.is_char_device()
         process.send_signal(number)
         process.communicate(timeout=SOON_S)
     assert not link.is_symlink()

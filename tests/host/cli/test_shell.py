@@ -18,6 +18,7 @@ from cubestack.host.cli.main import main
 from cubestack.host.clients.cubesense import client
 from cubestack.host.clients.cubesense.download import download_image
 from cubestack.host.emulation.process import emulating
+from tests.tiers import quick_ones
 
 TIMEOUT_S = 60
 
@@ -137,7 +138,7 @@ COMMANDS = (
     "watch Configuration 2 0.01; list 41; read 250"
 )
 SAID = ("NodeType  4", "Threshold1  77", "Threshold2   78 DN", "DetectionThreshold2: done")
-KINDS = ("pty", "tcp", "rfc2217", "i2c", "recorded", "recorded i2c")
+KINDS = ("pty", "tcp", "rfc2217", "i2c")
 
 
 @contextlib.contextmanager
@@ -148,23 +149,6 @@ def serving(kind, folder):
     with emulating(words, {"COLUMNS": "500"}) as said:
         line = next(line for line in said if line.startswith("CubeSense serves on "))
         yield f"i2c:{BUS}:0x1b" if kind == "i2c" else line.split()[3]
-
-
-@pytest.fixture
-def shell_on(tmp_path, monkeypatch, run):
-    """Runs commands on a kind of target; exit status, output, errors."""
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
-
-    def call(kind, commands, *options):
-        if kind.startswith("recorded"):
-            made = tmp_path / "session.rec"
-            call("i2c" if "i2c" in kind else "tcp", commands, "--record", made)
-            assert load_recording(made).setup.target.startswith(("i2c:", "tcp://"))
-            return run("shell", f"recorded:{made}", "-c", commands)
-        with serving(kind, tmp_path) as target:
-            return run("shell", target, "--device", "cubesense", "-c", commands, *options)
-
-    return call
 
 
 @pytest.fixture(scope="module")
@@ -185,12 +169,20 @@ def test_emulated_device_runs_the_commands(emulated):
     assert "near: " in err
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_every_kind_of_target_gives_the_same_output(shell_on, emulated, kind):
-    code, out, err = shell_on(kind, COMMANDS)
-    assert (code, without_times(out), err) == (emulated[0], without_times(emulated[1]), emulated[2])
+@pytest.mark.parametrize("kind", quick_ones(KINDS, "tcp", "i2c"))
+def test_every_kind_of_target_and_its_recording_give_the_same_output(
+    run, emulated, tmp_path, monkeypatch, kind
+):
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    made = tmp_path / "session.rec"
+    with serving(kind, tmp_path) as target:
+        live = run("shell", target, "--device", "cubesense", "-c", COMMANDS, "--record", made)
+    assert load_recording(made).setup.target == target
+    recorded = run("shell", f"recorded:{made}", "-c", COMMANDS)
+    assert without_times(live) == without_times(recorded) == without_times(emulated)
 
 
-def without_times(text: str) -> str:
+def without_times(outcome: tuple[int, str, str]) -> tuple[int, str, str]:
     """Without the times of ``watch``, which are those of the target."""
-    return re.sub(r"^after [\d.]+ s$", "after", text, flags=re.MULTILINE)
+    code, out, err = outcome
+    return code, re.sub(r"^after [\d.]+ s$", "after", out, flags=re.MULTILINE), err
