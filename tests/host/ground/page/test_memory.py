@@ -20,13 +20,11 @@ from ..conftest import SOON_S
 
 pytestmark = [pytest.mark.xdist_group("page hours"), pytest.mark.slow]
 
-EIGHT_HOURS_S = 8 * 3600
 TABS = 8
 FRAMES = ["AttitudeQuaternion", "TaskStatus", "PerformanceParameters"]
 
-HOURS = pytest.mark.parametrize(
-    ("begin_s", "end_s"), [(600, 1000), (EIGHT_HOURS_S // 10, EIGHT_HOURS_S)]
-)
+END_S = 8 * 3600
+BEGIN_S = END_S // 10
 
 MOST_GROWTH = 1 << 20
 """Bytes, of the page's heap and of the server's memory."""
@@ -101,16 +99,15 @@ def resident(process: Any) -> int:
     return next(int(line.split()[1]) << 10 for line in lines if line.startswith("VmRSS"))
 
 
-@HOURS
-def test_server_memory_does_not_grow(server: Any, begin_s: int, end_s: int) -> None:
+def test_server_memory_does_not_grow(server: Any) -> None:
     address = server.stdout.readline().strip()
     with ThreadPoolExecutor(TABS) as pool:
-        [*pool.map(lambda _tab: told(address, begin_s), range(TABS))]
+        [*pool.map(lambda _tab: told(address, BEGIN_S), range(TABS))]
         early = resident(server)
-        [last, *_] = pool.map(lambda _tab: told(address, end_s), range(TABS))
+        [last, *_] = pool.map(lambda _tab: told(address, END_S), range(TABS))
         late = resident(server)
-    print(f"server: {early} bytes at {begin_s} s, {late} at {end_s} s")
-    assert last["results_logged"] > 0.9 * end_s
+    print(f"server: {early} bytes at {BEGIN_S} s, {late} at {END_S} s")
+    assert last["results_logged"] > 0.9 * END_S
     assert last["link"]["failed"] == 0
     assert late - early < MOST_GROWTH
 
@@ -126,8 +123,7 @@ def measured(page: Any) -> Page:
     return Page(found["JSHeapUsedSize"], found["Nodes"], found["JSEventListeners"])
 
 
-@HOURS
-def test_page_memory_does_not_grow(chromium: Any, server: Any, begin_s: int, end_s: int) -> None:
+def test_page_memory_does_not_grow(chromium: Any, server: Any) -> None:
     address = server.stdout.readline().strip()
     message = told(address, 1)
     with shown(chromium, address) as page:
@@ -144,15 +140,15 @@ def test_page_memory_does_not_grow(chromium: Any, server: Any, begin_s: int, end
                 page.evaluate(SECONDS, [message, first, min(first + AT_ONCE, end), 20])
             return measured(page)
 
-        early = seconds(0, begin_s)
-        late = seconds(begin_s, end_s)
+        early = seconds(0, BEGIN_S)
+        late = seconds(BEGIN_S, END_S)
         newest = page.locator("#lines li").first.inner_text()
         fetched = page.evaluate(
             "performance.getEntriesByType('resource').some((e) => e.name.includes('/pictures/'))"
         )
-    print(f"page: {early} at {begin_s} s, {late} at {end_s} s")
+    print(f"page: {early} at {BEGIN_S} s, {late} at {END_S} s")
     assert fetched
-    assert f"{end_s - 1} s something happened" in newest
+    assert f"{END_S - 1} s something happened" in newest
     assert late.nodes <= early.nodes + 100
     assert late.listeners <= early.listeners
     assert late.heap - early.heap < MOST_GROWTH

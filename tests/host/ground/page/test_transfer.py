@@ -12,7 +12,7 @@ from cubestack.host.targets import connect
 
 from ..browser import line, port_of, saved, shown, station
 
-pytestmark = pytest.mark.xdist_group("other pages")
+pytestmark = [pytest.mark.xdist_group("other pages"), pytest.mark.slow]
 
 
 @pytest.fixture
@@ -47,7 +47,6 @@ def test_uploaded_image_is_downloaded_unchanged(chromium: Any, tmp_path: Path, p
         assert downloaded(page, tmp_path / "other.png") == png(sent[1])
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("port", ["cubesense"], indirect=True)
 def test_captured_image_is_downloaded_unchanged(chromium: Any, tmp_path: Path, port: str) -> None:
     with station(port, "--device", "cubesense") as address, shown(chromium, address) as page:
