@@ -44,7 +44,7 @@ def test_search_solves_nearly_all_skies_and_is_never_wrong(
 
 def test_hint_in_the_opposite_direction_identifies_nothing(tracker: Tracker) -> None:
     rng = np.random.default_rng(50)
-    for _ in range(20):
+    for _ in range(8):
         sky = tracker.sky(rng)
         found = tracker.identify(sky.directions, hint=-sky.boresight.astype(np.float32))
         assert found.outcome != "IDENTIFIED"
@@ -53,19 +53,19 @@ def test_hint_in_the_opposite_direction_identifies_nothing(tracker: Tracker) -> 
 @pytest.mark.parametrize("count", [5, 10, 20, 40])
 def test_false_stars_are_not_identified(tracker: Tracker, count: int) -> None:
     rng = np.random.default_rng(60 + count)
-    for _ in range(15):
+    for _ in range(6):
         assert (tracker.identify(tracker.false_rays(rng, count)).stars == -1).all()
 
 
 def test_rejects_mirrored_sky(tracker: Tracker) -> None:
     rng = np.random.default_rng(70)
     outcomes = []
-    for _ in range(20):
+    for _ in range(8):
         found = tracker.identify(tracker.sky(rng).directions * MIRROR)
         assert (found.stars == -1).all()
         outcomes.append(found.outcome)
     expected = "MIRRORED" if isinstance(tracker, PairTracker) else "UNCONFIRMED"
-    assert outcomes.count(expected) >= 19
+    assert outcomes.count(expected) >= 7
 
 
 def test_rejects_too_few_stars(tracker: Tracker) -> None:
@@ -89,13 +89,13 @@ def test_false_stars_never_change_an_identity(tracker: Tracker) -> None:
 def test_identification_measures_the_focal_length_error(tracker: Tracker, scale: float) -> None:
     rng = np.random.default_rng(83)
     solved = 0
-    for _ in range(12):
+    for _ in range(6):
         sky = tracker.sky(rng)
         found = tracker.identify(scaled(sky.directions, scale, tracker.meter()))
         solved += found.is_right(sky.stars)
         if np.count_nonzero(found.stars != -1) >= 6:
             assert found.scale == pytest.approx(scale, abs=0.002)
-    assert solved >= (11 if abs(scale - 1) < 0.02 else 8)
+    assert solved >= (5 if abs(scale - 1) < 0.02 else 4)
 
 
 def test_identified_attitude_has_false_alarm_rate_and_scale(tracker: Tracker) -> None:

@@ -12,7 +12,7 @@ from cubestack.hdl.contract.cubestar.declared import FULL_FRAME
 from cubestack.hdl.cubestar.top import CubeStarTop
 from cubestack.hdl.flow.generate import verilog_text
 from tests.hdl.cubestar.as_published import AsPublished, DoubleAsPublished, SharedAsPublished
-from tests.hdl.regression import STAR, TIERS, modules
+from tests.hdl.regression import FULL, STAR, TIERS, modules
 from tests.tiers import quick
 
 SIZES = [(5, 3), (8, 4), (16, 8)]
@@ -37,7 +37,7 @@ def test_published_needs_no_initial_values(icarus: Any, seed: int) -> None:
     icarus.run(CubeStarTop, 5, 3, *shuffled, seed=seed, initialised=False)
 
 
-@pytest.mark.slow
+@pytest.mark.skipif(not FULL, reason="make test-hdl; here tests/emulator/rtl/test_icarus.py")
 def test_store_and_read_of_a_full_frame_pass_the_testbench(icarus: Any) -> None:
     icarus.run(CubeStarTop, 1024, 512, *modules(STAR, "full_frame"), seed=1, harness=FULL_FRAME)
 

@@ -36,12 +36,11 @@ def test_bad_ends_are_noticed(status: int, said: str) -> None:
 
 
 def test_a_few_wrong_inputs_are_refused_in_one_line() -> None:
-    done = tried(30, 1)
+    done = tried(12, 1)
     assert done.returncode == 0, done.stdout + done.stderr
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [2, 3])
-def test_wrong_inputs_are_refused_in_one_line(seed: int) -> None:
-    done = tried(200, seed)
+def test_wrong_inputs_are_refused_in_one_line() -> None:
+    done = tried(200, 2)
     assert done.returncode == 0, done.stdout + done.stderr

@@ -19,7 +19,7 @@ from cubestack.host.output import Outputs
 from cubestack.host.recording.record_file import RecordFile
 from cubestack.host.recording.setups import emulated_setup
 
-MOMENTS = 100
+MOMENTS = 30
 
 
 @contextmanager

@@ -142,6 +142,7 @@ def test_type_error_of_dask_means_that_a_result_is_lost(file: str, raised: type[
         workers._result(failed)
 
 
+@pytest.mark.slow
 def test_lost_scheduler_is_reported() -> None:
     with dask_cluster(1) as cluster, pytest.raises(WorkersError):  # noqa: PT012 - in between
         for number, _ in performed(square, range(1000), 1, cluster.scheduler_address):
