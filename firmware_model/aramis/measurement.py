@@ -65,6 +65,7 @@ def configuration(
         always_pivot=switches.pivots == "always",
         filtered=switches.aided == "filtered",
         identities=switches.identities,
+        by_variance=switches.scores == "variance",
         verify=bool(matching["Verify"]) and switches.belief == "confirmed",
         hint_tolerance_deg=float(matching["HintTolerance"]),
     )

@@ -33,7 +33,7 @@ class AramisProgram:
         #: state: the program's memory, also read by traces
         self.state = state = State(hardware.flash, switches)
         self._camera = Camera(hardware, state, meter)
-        self._catalogue = CatalogueStore(hardware, meter)
+        self._catalogue = CatalogueStore(hardware, meter, switches.ram)
         self._measuring = Measuring(meter, state, self._camera, self._catalogue)
         #: the telecommands
         self.commands = Commands(

@@ -46,6 +46,9 @@ class Profile(DeclaredValues):
         "separation of stars; either: where the sides are checked, by section 5.8's criteria",
         ("section-5.8", "appendix-e", "either"),
     )
+    by_variance: bool = flag(
+        False, "section 5.8's criteria score the variance over the mean, as its text says"
+    )
     verify: bool = flag(
         False, "an attitude must be confirmed by further stars; what follows is only then"
     )

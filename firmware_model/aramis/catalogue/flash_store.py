@@ -2,12 +2,11 @@
 
 AraMiS thesis, sections 2.1 (code against upsets in flash, periodic reloading into RAM) and 2.3.
 In flash, all in words of :mod:`hamming`: eight bytes (magic, length), then the image of
-:mod:`database`. In RAM it is not coded, so its checksum is computed before each use; a damaged copy
-is loaded again. A reload that finds uncorrectable words keeps the good copy in RAM.
+:mod:`database`. The copy in RAM (:mod:`ram_copy`) is checked before each use; one that is damaged
+beyond mending is loaded again. A reload that finds uncorrectable words keeps the good copy in RAM.
 """
 
 import struct
-from zlib import crc32
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +14,8 @@ from numpy.typing import NDArray
 from cubestack.firmware_model.aramis.catalogue import hamming
 from cubestack.firmware_model.aramis.catalogue.database import Database, DatabaseError
 from cubestack.firmware_model.aramis.catalogue.hamming import CODED_BYTES, DATA_BYTES
-from cubestack.firmware_model.aramis.hardware import CATALOGUE_AT, SECTOR_BYTES, AramisHardware
+from cubestack.firmware_model.aramis.catalogue.ram_copy import Protection, RamCopy
+from cubestack.firmware_model.aramis.hardware import SECTOR_BYTES, AramisHardware
 from cubestack.firmware_model.interface.aramis import MOST_CATALOGUE_BYTES, CatalogueState
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Routine, pause
@@ -47,20 +47,20 @@ def flash_image(image: bytes) -> NDArray[np.uint8]:
 class CatalogueStore:
     """Loads, checks and writes the catalogue."""
 
-    def __init__(self, hardware: AramisHardware, meter: Meter) -> None:
+    def __init__(
+        self, hardware: AramisHardware, meter: Meter, protection: Protection = "checksum"
+    ) -> None:
         self._hardware = hardware
         self._meter = meter
+        self._ram = RamCopy(hardware.sdram, meter, protection)
         self.database: Database | None = None  #: the copy in RAM; None if there is no good one
         self.state = CatalogueState.NOT_LOADED  #: of the copy in RAM
         self.loads = self.failures = 0  #: passes over the flash, and those without a good catalogue
         self.corrected = self.lost = 0  #: words of the latest pass
-        self.corrected_total = 0  #: words corrected since power-up
+        self.corrected_total = 0  #: words corrected since power-up, in flash and in RAM
         self.ram_errors = 0  #: how often RAM was found damaged
         self.load_us = 0  #: duration of the latest pass's steps
         self.loaded_us: int | None = None  #: end of the latest pass; None before
-        self._length = 0
-        self._checksum = 0
-        self._copy = np.zeros(0, np.uint8)  # of the model: bytes whose checksum this is
         self._at = 0  # next word of the image in the pass
         self._pass_length: int | None = None
         self._pass_corrected = self._pass_lost = self._pass_us = 0
@@ -68,7 +68,7 @@ class CatalogueStore:
     @property
     def length(self) -> int:
         """Bytes of the image in RAM; 0 without one."""
-        return self._length if self.database is not None else 0
+        return self._ram.length if self.database is not None else 0
 
     @property
     def loading(self) -> bool:
@@ -103,14 +103,17 @@ class CatalogueStore:
         return ended
 
     def ensure(self) -> Routine[bool]:
-        """Verify the checksum of RAM, and reload on a mismatch; returns whether RAM is good."""
+        """Check RAM, and reload what cannot be mended; returns whether RAM is good."""
         if self.database is None:
             return False
-        intact = self._ram_checksum() == self._checksum
+        wrong = self._ram.check()
         yield Pay()
-        if intact:
+        if wrong == 0:
             return True
         self.ram_errors += 1
+        if wrong is not None:
+            self.corrected_total += wrong
+            return True
         self.forget()
         return (yield from self.load())
 
@@ -130,19 +133,8 @@ class CatalogueStore:
         """Write the good copy of RAM to the flash; False if there is none."""
         if not (yield from self.ensure()):
             return False
-        yield from self.program(self._ram(self._length).tobytes())
+        yield from self.program(self._ram.view(self.length).tobytes())
         return True
-
-    def _ram(self, length: int) -> NDArray[np.uint8]:
-        return self._hardware.sdram[CATALOGUE_AT : CATALOGUE_AT + length]
-
-    def _ram_checksum(self) -> int:
-        size = self._length
-        self._meter.charge(ram_read=-(-size // 4), table_byte=size, loop=size)
-        found = self._ram(size)
-        if np.array_equal(found, self._copy):  # a tenth of the model's time
-            return self._checksum
-        return crc32(found.data)
 
     def _begin(self) -> None:
         """Read the header and start a pass; one without a header ends at once."""
@@ -165,8 +157,7 @@ class CatalogueStore:
         decoded = hamming.decode(coded, self._meter)
         first = DATA_BYTES * self._at
         if self.database is None or not len(decoded.lost):
-            stop = min(length, first + DATA_BYTES * words)
-            self._ram(length)[first:stop] = decoded.data[: stop - first]
+            self._ram.write(first, decoded, length)
         self._pass_corrected += decoded.corrected
         self._pass_lost += len(decoded.lost)
         self._at += words
@@ -183,7 +174,7 @@ class CatalogueStore:
             self.failures += 1
             self.state = CatalogueState.DAMAGED if self.lost else CatalogueState.MISSING
             return
-        image = self._ram(length).data
+        image = self._ram.view(length).data
         self._meter.charge(ram_read=-(-length // 4), table_byte=length, loop=length)
         try:
             self.database = Database.unpack(image)
@@ -192,6 +183,4 @@ class CatalogueStore:
             self.state = CatalogueState.DAMAGED
             return
         self.state = CatalogueState.GOOD
-        self._length = length
-        self._checksum = crc32(image)
-        self._copy = self._ram(length).copy()
+        self._ram.accept(length)

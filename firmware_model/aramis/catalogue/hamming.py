@@ -1,6 +1,7 @@
-"""Error-correcting code of the catalogue in flash: one bit in 72 corrected, two detected.
+"""Error-correcting code of the catalogue: one bit in 72 corrected, two detected.
 
-AraMiS thesis, sections 2.1 (an error-correcting code) and 2.3.2 (room for a Hamming code).
+AraMiS thesis, sections 2.1 (an error-correcting code), 2.3.2 and 2.3.3 (room for a Hamming code in
+flash and RAM).
 Assumed: one whose 72 columns all have an odd number of ones (Hsiao, "A Class of Optimal Minimum
 Odd-weight-column SEC-DED Codes", 1970): 64 bits of data, 8 check bits. A syndrome with an odd
 number of ones is a single error if a column matches; with an even number it is two errors.
@@ -50,6 +51,7 @@ class Decoded:
     """Result of decoding."""
 
     data: NDArray[np.uint8]  #: bytes (8 n,), uint8
+    checks: NDArray[np.uint8]  #: check bytes (n,), uint8
     corrected: int  #: number of words with one wrong bit, which was corrected
     lost: Indices  #: indices of words with more than one
 
@@ -77,21 +79,30 @@ def decode(coded: NDArray[np.uint8], meter: Meter) -> Decoded:
     if len(coded) % CODED_BYTES:
         raise ValueError(f"coded data comes in words of {CODED_BYTES} bytes, not {len(coded)}")
     words = coded.reshape(-1, CODED_BYTES)
-    data = words[:, :DATA_BYTES].copy()
-    syndromes = _check(words) ^ words[:, DATA_BYTES]
+    data, checks = words[:, :DATA_BYTES].copy(), words[:, DATA_BYTES].copy()
+    corrected, lost = mend(data, checks)
+    meter.charge(flash_read=-(-len(coded) // 2), coded_word=len(words))
+    meter.charge(correction=corrected + len(lost), loop=len(words), ram_write=2 * len(words))
+    return Decoded(data.reshape(-1), checks, corrected, lost)
+
+
+def mend(data: NDArray[np.uint8], checks: NDArray[np.uint8]) -> tuple[int, Indices]:
+    """Correct single errors of words ``data`` (n, 8) and ``checks`` (n,) in place; not charged.
+
+    Returns the number of words with one wrong bit, and the indices of those with more.
+    """
+    syndromes = _check(data) ^ checks
     wrong = np.flatnonzero(syndromes)
     bits = _LOCATED[syndromes[wrong]]
     single = bits >= 0
-    in_data = single & (bits < DATA_BITS)
-    at, bit = wrong[in_data], bits[in_data]
-    data[at, bit // 8] ^= (1 << bit % 8).astype(np.uint8)
-    meter.charge(flash_read=-(-len(coded) // 2), coded_word=len(words), correction=len(wrong))
-    meter.charge(loop=len(words), ram_write=2 * len(words))
-    return Decoded(data.reshape(-1), int(single.sum()), wrong[~single])
+    for part, chosen in ((data, single & (bits < DATA_BITS)), (checks, bits >= DATA_BITS)):
+        at, bit = wrong[chosen], bits[chosen]
+        part[(at, bit // 8) if part is data else at] ^= (1 << bit % 8).astype(np.uint8)
+    return int(single.sum()), wrong[~single]
 
 
 def _check(words: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Check byte (n,) of the data in words (n, 9)."""
+    """Check byte (n,) of the data in words (n, 8 or more)."""
     check = np.zeros(len(words), np.uint8)
     for place in range(DATA_BYTES):
         check ^= _CHECKS[place][words[:, place]]

@@ -3,8 +3,10 @@
 AraMiS thesis, section 5.8 (tables 5.1 to 5.3). Two criteria add a score to a 3 x 3 matrix of
 measured against catalogue stars: the order of brightness, and the order of the sides. Each scores
 its coefficient of variation (standard deviation over mean of the three measured values), so the
-criterion with the larger differences decides. A side represents the star opposite to it.
-`assign_plainly` follows the listing of appendix E, which differs.
+criterion with the larger differences decides. A side represents the star opposite to it. The text
+calls the numerator the variance; with that the score has a unit, and of brightness in counts it is
+thousands of times that of sides in radians. `assign_plainly` follows the listing of appendix E,
+which differs.
 """
 
 from dataclasses import dataclass
@@ -31,12 +33,19 @@ class Assignment:
 
 
 def assign(
-    brightness: Floats, sides: Floats, v_mag: Floats, catalogue: Floats, meter: Meter
+    brightness: Floats,
+    sides: Floats,
+    v_mag: Floats,
+    catalogue: Floats,
+    meter: Meter,
+    *,
+    by_variance: bool = False,
 ) -> Assignment:
     """Score the stars of a measured triangle against those of the catalogue's.
 
     Measured are the ``brightness`` (3,), in any linear unit, and the ``sides`` (3,) a, b, c; of the
-    catalogue's stars the magnitudes (3,) and unit vectors (3, 3) are known.
+    catalogue's stars the magnitudes (3,) and unit vectors (3, 3) are known. ``by_variance``: a
+    score is the variance over the mean, and depends on that unit.
     """
     corners = catalogue.astype(np.float32)
     x, y, z = (corners[[0, 1, 0]] - corners[[1, 2, 2]]).T
@@ -45,7 +54,8 @@ def assign(
     by_brightness = _correspond(-brightness, v_mag)
     by_sides = np.empty(3, dtype=np.intp)
     by_sides[OPPOSITE] = OPPOSITE[_correspond(sides, expected)]
-    weights = variation(brightness, meter), variation(sides, meter)
+    spread = dispersion if by_variance else variation
+    weights = spread(brightness, meter), spread(sides, meter)
     scores = np.zeros((3, 3), dtype=np.float32)
     measured = np.arange(3)
     scores[measured, by_brightness] += weights[0]
@@ -84,11 +94,25 @@ def assign_plainly(brightness: Floats, sides: Floats, catalogue: Floats, meter: 
 
 def variation(values: Floats, meter: Meter) -> np.float32:
     """Coefficient of variation of three values: sample standard deviation over mean."""
+    variance, mean = _moments(values, meter)
+    meter.charge(f32_div=1, f32_sqrt=1, f32_compare=1)
+    return np.float32(np.sqrt(variance) / mean) if mean > 0 else np.float32(0)
+
+
+def dispersion(values: Floats, meter: Meter) -> np.float32:
+    """Sample variance of three values over their mean."""
+    variance, mean = _moments(values, meter)
+    meter.charge(f32_div=1, f32_compare=1)
+    return np.float32(variance / mean) if mean > 0 else np.float32(0)
+
+
+def _moments(values: Floats, meter: Meter) -> tuple[np.float32, np.float32]:
+    """Sample variance and mean of three values."""
     x, y, z = values.astype(np.float32)
     mean = (x + y + z) / _THREE
     squares = (x - mean) ** 2 + (y - mean) ** 2 + (z - mean) ** 2
-    meter.charge(f32_add=7, f32_mul=3, f32_div=3, f32_sqrt=1, f32_compare=1)
-    return np.float32(np.sqrt(squares / _TWO) / mean) if mean > 0 else np.float32(0)
+    meter.charge(f32_add=7, f32_mul=3, f32_div=2)
+    return squares / _TWO, mean
 
 
 def _correspond(measured: Floats, expected: Floats) -> Indices:

@@ -162,7 +162,9 @@ class _Search:
             sides, v_mag = match.main.sides, database.v_mag[stars]
             if self.profile.identities == "appendix-e":
                 return [stars[assign_plainly(brightness, sides, known, self.meter)]]
-            found = assign(brightness, sides, v_mag, known, self.meter)
+            found = assign(
+                *(brightness, sides, v_mag, known, self.meter), by_variance=self.profile.by_variance
+            )
         differ = self.profile.identities == "either" and (found.order != found.other).any()
         return [stars[order] for order in (found.order, found.other)[: 1 + differ]]
 

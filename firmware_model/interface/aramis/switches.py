@@ -76,6 +76,27 @@ class AramisSwitches(Switches):
         "operations; compiled is gcc's in C, the slowest; every time is between the two",
         hardware=True,
     )
+    scores: Literal["deviation", "variance"] = switch(
+        "what the score of a criterion is, over the mean of its three values",
+        "deviation",
+        "deviation",
+        "variance",
+        source="tables 5.2 and 5.3",
+        reason="the score is called the coefficient of variation, which has the standard "
+        "deviation; section 5.8 calls its numerator the variance",
+    )
+    ram: Literal["checksum", "redundant", "coded"] = switch(
+        "how the catalogue in RAM is protected",
+        "checksum",
+        "checksum",
+        "redundant",
+        "coded",
+        source="section 2.3.3: RAM should be able to store a redundant or Hamming-coded catalogue; "
+        "no printed program does",
+        reason="checksum finds damage and loads the catalogue again; the others mend it in RAM, "
+        "for memory and time",
+        hardware=True,
+    )
 
 
 DEFAULT_SWITCHES = AramisSwitches()

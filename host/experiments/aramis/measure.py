@@ -13,6 +13,7 @@ examples:
   cubestack measure aramis --profile extended --frames 100   what is believed is confirmed
   cubestack measure aramis --field 18 --roll-rate 10 --exposure 20
   cubestack measure aramis --bit-flips 1e-6                  upsets in flash
+  cubestack measure aramis --ram-flips 1e-7 --set ram=coded  upsets in RAM
 """
 
 import time
@@ -97,6 +98,14 @@ class AramisOptions(attitudes.SkyOptions):
         1,
         metavar="RATE",
     )
+    ram_flips: float = number(
+        0.0,
+        "flip each bit of the SDRAM, which holds the catalogue, with this probability before each "
+        "frame",
+        0,
+        1,
+        metavar="RATE",
+    )
     crop: tuple[int, int] = corner(
         (0, 0), "with --image: left upper corner of the 1280 x 1024 part"
     )
@@ -137,7 +146,7 @@ class AramisResult(attitudes.AttitudeResult):
     #: diameter from the boresight, which appendix E counts as wrong; None without truth or triangle
     far: bool | None
     image_time_s: float  #: mid-exposure by the star tracker's clock, since power-up
-    #: flips, corrected, lost: flipped bits in flash, and corrected and lost words on loading
+    #: flips, corrected, lost: flipped bits in memories, and corrected and lost words on loading
     flips: int
     corrected: int
     lost: int
@@ -183,6 +192,8 @@ class _Experiment(attitudes.AttitudeExperiment["AramisOpener", AramisOptions, Ar
                     emulated.board.catalogue_flash[:] = pristine
                     flips = emulated.board.irradiate("flash", options.bit_flips)
                     aramis.activate()
+                if options.ram_flips:
+                    flips += emulated.board.irradiate("sdram", options.ram_flips)
                 aramis.client.pause(float(rng.uniform(0, PHASE_S)))
                 yield _measure(emulated, options, rng, flips, opened.rates)
 

@@ -1,6 +1,8 @@
 """AraMiS' published figures (thesis, Politecnico di Torino, 2008) and their trials."""
 
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -21,6 +23,7 @@ from cubestack.firmware_model.interface.aramis import IMAGE_BYTES
 from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.host.experiments.aramis.measure import AramisOpener, AramisResult
+from cubestack.host.studies.aramis.printed import bounds, spikes
 from cubestack.host.studies.fidelity.table import Fidelity, read_tables
 from cubestack.host.studies.rows.estimate import average, rate
 from cubestack.host.studies.rows.trial import Figures, Trial, measured
@@ -99,6 +102,28 @@ def _lookups(_opened: AramisOpener, frames: int) -> Figures:
     return dict(zip(names, map(average, np.array(counts).T), strict=True))
 
 
+def _checks(results: Sequence[AramisResult]) -> Figures:
+    """Check of the catalogue in RAM before each measurement: mean and longest in ms."""
+    checks = [float(result.phase_ms["check"]) for result in results]
+    return {
+        "check": average(checks),
+        "longest": max(checks),
+        "right": rate(r.right for r in results),
+    }
+
+
+def _switched(summary: Any, frames: int, quick: int, seconds: float, **options: Any) -> Trial:
+    """A trial with some switches set, in profile `published`."""
+    return replace(
+        measured("aramis", summary, frames, quick, seconds, extremes=("longest",), **options),
+        profiles=False,
+    )
+
+
+def _in_ram(protection: str) -> Trial:
+    return _switched(_checks, 60, 2, 5, ram_flips=1e-8, set=f"ram={protection}")
+
+
 FIDELITY = Fidelity(
     page="fidelity-aramis.md",
     trials={
@@ -106,6 +131,10 @@ FIDELITY = Fidelity(
         "aided": measured("aramis", _attitudes, 100, 3, 30, mode="assisted", hint_error=2),
         "catalogue": Trial(_catalogue, seconds=30, profiles=False),
         "lookups": Trial(_lookups, 300, 20, 5, profiles=False),
+        "spikes": Trial(spikes, 30, 2, 5, profiles=False),
+        "bounds": Trial(bounds, 300, 20, 5, profiles=False),
+        "scores": _switched(_attitudes, 100, 3, 10, set="scores=variance"),
+        **{f"ram-{one}": _in_ram(one) for one in ("checksum", "redundant", "coded")},
     },
     tables=read_tables("cubestack.host.studies.aramis"),
 )

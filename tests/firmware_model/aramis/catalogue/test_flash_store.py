@@ -7,6 +7,7 @@ from cubestack.emulator.boards.aramis.catalogue import CatalogueParameters
 from cubestack.firmware_model.aramis.catalogue import hamming
 from cubestack.firmware_model.aramis.catalogue.flash_store import CatalogueStore, flash_image
 from cubestack.firmware_model.aramis.catalogue.hamming import decode, encode
+from cubestack.firmware_model.aramis.catalogue.ram_copy import Protection
 from cubestack.firmware_model.aramis.hardware import CATALOGUE_AT, SECTOR_BYTES
 from cubestack.firmware_model.interface.aramis import MOST_CATALOGUE_BYTES, CatalogueState
 
@@ -15,13 +16,13 @@ from ..sky import database, meter
 
 
 class Desk:
-    def __init__(self, image: bytes | None = None) -> None:
+    def __init__(self, image: bytes | None = None, protection: Protection = "checksum") -> None:
         self.unit = Harness()
         real = database(CatalogueParameters(step_deg=10, stars_per_field=5)).pack()
         self.image = real if image is None else image
         self.coded = flash_image(self.image)
         self.unit.catalogue_flash[: len(self.coded)] = self.coded
-        self.store = CatalogueStore(self.unit, self.unit.meter)
+        self.store = CatalogueStore(self.unit, self.unit.meter, protection)
 
     def load(self) -> bool:
         return self.unit.perform(self.store.load())
@@ -121,6 +122,38 @@ def test_damaged_catalogue_in_ram_is_detected_and_reloaded(desk: Desk) -> None:
         assert desk.unit.perform(desk.store.ensure())
         assert desk.store.ram_errors == errors + 1
         assert desk.ram.tobytes() == desk.image
+
+
+@pytest.mark.parametrize("protection", ["redundant", "coded"])
+def test_protected_copy_is_mended_without_the_flash(protection: Protection) -> None:
+    desk = Desk(protection=protection)
+    desk.load()
+    desk.unit.catalogue_flash[:] = 0xFF
+    desk.ram[[5, 5000]] ^= 0x10
+    assert desk.unit.perform(desk.store.ensure())
+    assert desk.ram.tobytes() == desk.image
+    assert (desk.store.loads, desk.store.ram_errors, desk.store.corrected_total) == (1, 1, 2)
+
+
+def test_two_errors_in_a_coded_word_load_the_catalogue_again() -> None:
+    desk = Desk(protection="coded")
+    desk.load()
+    desk.ram[[5, 5000, 5001]] ^= 0x10
+    assert desk.unit.perform(desk.store.ensure())
+    assert desk.ram.tobytes() == desk.image
+    assert (desk.store.loads, desk.store.ram_errors) == (2, 1)
+    assert desk.unit.perform(desk.store.ensure())
+    assert desk.store.ram_errors == 1
+
+
+@pytest.mark.parametrize("protection", ["redundant", "coded"])
+def test_periodic_reload_keeps_the_protection_whole(protection: Protection) -> None:
+    desk = Desk(protection=protection)
+    desk.load()
+    desk.load()
+    desk.ram[77] ^= 1
+    assert desk.unit.perform(desk.store.ensure())
+    assert (desk.store.loads, desk.store.corrected_total) == (2, 1)
 
 
 def test_damage_in_ram_and_flash_leaves_no_catalogue(desk: Desk) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.aramis.matching.assignment import assign, variation
+from cubestack.firmware_model.aramis.matching.assignment import assign, dispersion, variation
 from cubestack.firmware_model.aramis.matching.identification import identify
 from cubestack.firmware_model.aramis.matching.triangles import Triangle, measure_triangle
 from cubestack.firmware_model.aramis.solution import NONE, StarList
@@ -161,6 +161,18 @@ def test_assignment_scores_are_coefficients_of_variation() -> None:
     scores = assign(light, measured, MAGNITUDES, catalogue, meter()).scores
     expected = np.std(light, ddof=1) / np.mean(light) + np.std(measured, ddof=1) / np.mean(measured)
     np.testing.assert_allclose(scores, np.eye(3) * expected, rtol=1e-5)
+
+
+def test_variance_lets_counts_outweigh_sides() -> None:
+    """Section 5.8's words: the score has a unit, so brightness decides even where it hardly
+    differs."""
+    catalogue, wrong = corners(3), np.roll(range(3), 1).tolist()
+    counts = np.float32(1e4) * (1000 + brightness(MAGNITUDES)[wrong] / np.float32(100))
+    compared = counts, sides(catalogue), MAGNITUDES, catalogue, meter()
+    assert assign(*compared).order.tolist() == [0, 1, 2]
+    assert assign(*compared, by_variance=True).order.tolist() == wrong
+    values = np.array([2, 5, 9], np.float32)
+    assert dispersion(values, meter()) == pytest.approx(np.var(values, ddof=1) / values.mean())
 
 
 def test_variation_does_not_depend_on_the_unit() -> None:

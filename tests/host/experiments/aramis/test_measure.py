@@ -80,6 +80,15 @@ def test_aramis_measure_supports_modes_noise_rates_and_settings() -> None:
     assert turning.right
 
 
+def test_coded_catalogue_survives_flips_of_ram_without_reading_the_flash() -> None:
+    plain, coded = (
+        list(measure(ram_flips=1e-7, frames=2, **more)) for more in ({}, {"set": "ram=coded"})
+    )
+    assert all(frame.flips > 5 and "RamError" in frame.status for frame in [*plain, *coded])
+    (check,) = {frame.phase_ms["check"] for frame in coded}
+    assert all(frame.phase_ms["check"] > 4 * check for frame in plain)
+
+
 def test_bit_flips_in_flash_are_counted() -> None:
     for frame in measure(bit_flips=3e-6, frames=2):
         assert 0 < frame.corrected <= frame.flips
