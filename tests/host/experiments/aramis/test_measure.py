@@ -85,7 +85,7 @@ def test_coded_catalogue_survives_flips_of_ram_without_reading_the_flash() -> No
         list(measure(ram_flips=1e-7, frames=2, **more)) for more in ({}, {"set": "ram=coded"})
     )
     assert all(frame.flips > 5 and "RamError" in frame.status for frame in [*plain, *coded])
-    (check,) = {frame.phase_ms["check"] for frame in coded}
+    check = max(frame.phase_ms["check"] for frame in coded)
     assert all(frame.phase_ms["check"] > 4 * check for frame in plain)
 
 
