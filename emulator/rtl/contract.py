@@ -88,7 +88,7 @@ class RtlEngine(ABC):
         self._cameras = [_Camera(number, pins) for number, pins in enumerate(wiring.cameras)]
         self._camera_of = {pin: camera for camera in self._cameras for pin in camera.pins.pins}
         self._idle = False  # no camera runs until a pin changes
-        self._next_strobe = 0, Fraction(0), Fraction(0)  # time, period, fraction
+        self._next_strobe = 0, Fraction(0), 0  # time, period, and parts of a ps in its denominator
         self._upsets: list[tuple[int, str, int]] = []  # time, register, bit; pending
         self.flip_changed = False
 
@@ -284,20 +284,21 @@ class RtlEngine(ABC):
         if period < 2:
             raise ValueError(f"a data clock needs a period of at least 2 ps, not {period}")
         self.run(self.now_ps)
-        start, fraction = self.now_ps, Fraction(0)
-        if self._next_strobe[:2] == (self.now_ps, period):
-            fraction = self._next_strobe[2]
-        # The largest n for which cycle n, which ends at floor(fraction + n * period), is in reach.
-        reach = ceil((until_ps - self.now_ps + 1 - fraction) / period) - 1
+        start, part = self.now_ps, 0
+        whole, parts = period.numerator, period.denominator  # the period is whole / parts ps
+        if self._next_strobe[:2] == (start, period):
+            part = self._next_strobe[2]
+        # The largest n for which cycle n, which ends at (part + n * whole) // parts, is in reach.
+        reach = -((part - (until_ps - start + 1) * parts) // whole) - 1
         cycles = max(0, min(len(out), reach))
-        upset = self._upsets and self._upsets[0][0] <= start + cycles * period
-        if self._running() or upset:
-            self._strobe_step_by_step(out[:cycles], period, fraction)
+        upset = self._upsets and (self._upsets[0][0] - start) * parts <= cycles * whole
+        if upset or (not self._idle and self._running()):
+            self._strobe_step_by_step(out[:cycles], period, Fraction(part, parts))
         else:
-            self._strobe(out[:cycles], period, fraction)
-        whole, fraction = divmod(fraction + cycles * period, 1)
-        self.run(start + whole)
-        self._next_strobe = (self.now_ps, period, fraction)
+            self._strobe(out[:cycles], period, Fraction(part, parts))
+        taken, part = divmod(part + cycles * whole, parts)
+        self.run(start + taken)
+        self._next_strobe = (self.now_ps, period, part)
         return cycles
 
     def access(self, transactions: Transactions, until_ps: int) -> int:

@@ -6,6 +6,7 @@ for the same number of line times before its readout.
 
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 
@@ -21,11 +22,11 @@ class RollingShutter:
     # enabled
     programmed_lines: int
 
-    @property
+    @cached_property
     def exposure_s(self) -> float:
         return float(self.exposure_lines * self.line_ps / PS_PER_S)
 
-    @property
+    @cached_property
     def line_s(self) -> float:
         return float(self.line_ps / PS_PER_S)
 

@@ -220,8 +220,8 @@ class CompiledEngine(RtlEngine):
     def _strobe(self, out: NDArray[np.uint8], period: Fraction, fraction: Fraction) -> None:
         if not out.flags.c_contiguous or out.dtype != np.uint8:
             raise ValueError("the destination of a transfer must be contiguous uint8")
-        half = period / 2
-        halves = half.numerator, half.denominator, int(fraction * half.denominator)
+        parts = 2 * period.denominator  # of a ps, for half a period
+        halves = period.numerator, parts, fraction.numerator * parts // fraction.denominator
         target, count = out.ctypes.data, len(out)
         self._library.driver_strobe(self._handle, target, count, self.now_ps, *halves)
         self._collect_violations()
