@@ -23,6 +23,7 @@ from cubestack.host.studies.calibrate import CalibrateOptions
 from cubestack.host.studies.cubestar.calibrate import EXPERIMENT
 from cubestack.host.studies.cubestar.layouts import LayoutOptions, attitudes_of_loop, measure_layout
 from cubestack.host.studies.cubestar.night import night
+from cubestack.host.studies.cubestar.readings import READINGS, night_by, signs
 from cubestack.host.studies.cubestar.shots import PICTURES, Shot, field_shots, slewing_shots
 from cubestack.host.studies.fidelity.table import Fidelity, read_tables
 from cubestack.host.studies.rows.estimate import average, rate, rate_of, resampled
@@ -295,7 +296,9 @@ FIDELITY = Fidelity(
         "noiseless": _measured(100, mag_limit=3.8, no_noise=True),
         "built": _measured(100, mag_limit=3.8),
         "full": _measured(60, mag_limit=4.5),
-        "night": Trial(night, 30, 1, 50),
+        "night": Trial(night, 30, 1, 20),
+        **{f"reading-{name}": Trial(partial(night_by, reading=name), 8, 1, 8) for name in READINGS},
+        "signs": Trial(signs, profiles=False),
         "loop": Trial(_loop, 20, 2, 10),
         **{
             f"layout-{layout.value}": Trial(partial(_layout, layout=layout.value), 30, 2, 5)

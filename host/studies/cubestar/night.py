@@ -10,26 +10,30 @@ the letter: coefficients that the toolbox fits from undistorted to distorted, us
 signs the other way round. It errs most along the picture's rows. Neither how the camera was turned
 is published nor the sidereal time: fields are taken every 45 deg of it, each turned by an angle
 that is drawn. Through this lens lost in space, as printed, does not find the stars of every field:
-one of which fewer than half of the pictures give an attitude, or whose logged angles scatter by
-more than a degree, is left out, as the test can not take place there.
+one of which fewer than half of the pictures give an attitude, or whose logged angles scatter, or
+are off, by more than a degree, is left out, as the test can not take place there.
 """
 
-from dataclasses import replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import astuple, dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
-from cubestack.emulator.camera.common.optics import Distortion
+from cubestack.emulator.camera.common.optics import Distortion, Optics
 from cubestack.emulator.camera.common.view import SkyView
 from cubestack.emulator.camera.mlx75412.lens import CONDITION, LENS
 from cubestack.emulator.scene.atmosphere import Atmosphere, earth_rate_deg_s
 from cubestack.emulator.scene.sky import SkyScene
+from cubestack.host.clients.contract import Columns
 from cubestack.host.clients.cubestar.client import CubeStar
 from cubestack.host.clients.cubestar.operator import LADDER
 from cubestack.host.devices.result_table import log_lines, scatter
 from cubestack.host.experiments.cubestar.measure import CubeStarOpener
 from cubestack.host.studies.rows.estimate import deviation
 
+PRINTED_LENS = replace(LENS, distortion=Distortion.TOOLBOX)
 LATITUDE_DEG, HEIGHT_M, SEEING_ARCSEC, SKY_MAG = -33.93, 120.0, 2.0, 20.0
 SIDEREAL_DEG = range(0, 360, 45)
 QUICK_FIELD = 2
@@ -40,6 +44,26 @@ INTERVAL_S = 3.0  # so that a hundred pictures are the published several minutes
 SETTLING = 3  # lines until the loop's first attitudes are out
 
 
+@dataclass(frozen=True)
+class Field:
+    """One field of view: scatter in degrees, stars of an attitude, and pictures with one."""
+
+    ra: float
+    dec: float
+    roll: float
+    across: float
+    fewest: int
+    most: int
+    valid: float  #: percent
+    off_deg: float  #: mean declination from the zenith's
+
+    @property
+    def is_held(self) -> bool:
+        """Whether the test can take place there."""
+        calm = max(self.roll, self.across) <= MOST_SCATTER_DEG
+        return self.valid >= LEAST_VALID and calm and self.off_deg <= MOST_SCATTER_DEG
+
+
 def night(opened: CubeStarOpener, frames: int) -> dict[str, float]:
     """Over the fields, scatter as root of the mean square; a few frames are of one, 1 s apart.
 
@@ -48,15 +72,38 @@ def night(opened: CubeStarOpener, frames: int) -> dict[str, float]:
     turned. ``fewest`` and ``most`` stars that an attitude rests on, ``valid``, pictures with an
     attitude in percent, in the mean; and ``fields``, of how many.
     """
-    condition = replace(CONDITION, optics=replace(LENS, distortion=Distortion.TOOLBOX))
+    return pooled([one for one in fields(opened, frames, PRINTED_LENS) if one.is_held], frames)
+
+
+def pooled(held: Sequence[Field], frames: int) -> dict[str, float]:
+    """Figures of ``night`` over these fields; none without one."""
+    if not held:
+        return {}
+    columns = np.array([astuple(one)[:7] for one in held]).T
+    squares, means = np.sqrt(np.mean(columns[:4] ** 2, axis=1)), columns[4:].mean(axis=1)
+    names = ("ra", "dec", "roll", "across", "fewest", "most", "valid")
+    # Lines through the angles of each field take two degrees of freedom.
+    sigmas = [deviation(float(one), max(len(held) * (frames - 2), 1)) for one in squares]
+    return dict(zip(names, [*sigmas, *map(float, means)], strict=True)) | {"fields": len(held)}
+
+
+def fields(
+    opened: CubeStarOpener,
+    frames: int,
+    optics: Optics,
+    settings: Mapping[str, Mapping[str, Any]] | None = None,
+) -> Iterator[Field]:
+    """All fields through a lens; a few frames are of one. ``settings``: of telecommands."""
     turned = np.random.default_rng(0).uniform(0, 360, len(SIDEREAL_DEG))
-    fields = list(zip(SIDEREAL_DEG, turned, strict=True))
-    found, whole = [], frames > SETTLING
-    for sidereal_deg, roll_deg in fields if whole else fields[QUICK_FIELD : QUICK_FIELD + 1]:
+    places = list(zip(SIDEREAL_DEG, turned, strict=True))
+    whole = frames > SETTLING
+    for sidereal_deg, roll_deg in places if whole else places[QUICK_FIELD : QUICK_FIELD + 1]:
         air = Atmosphere(LATITUDE_DEG, sidereal_deg, HEIGHT_M, SEEING_ARCSEC, sky_mag=SKY_MAG)
         sky = SkyScene.pointing(sidereal_deg, LATITUDE_DEG, float(roll_deg))
         sky = replace(sky, rate_deg_s=earth_rate_deg_s(sky.quaternion), atmosphere=air)
-        with opened(SkyView(sky, condition), seed=0) as emulated:
+        with opened(SkyView(sky, replace(CONDITION, optics=optics)), seed=0) as emulated:
+            if settings:
+                emulated.client.configure(settings)
             choose_threshold(emulated.client)
             emulated.client.client.command("Trigger")
             lines = log_lines(
@@ -66,23 +113,20 @@ def night(opened: CubeStarOpener, frames: int) -> dict[str, float]:
                 interval_s=INTERVAL_S if whole else 1.0,
             )
             good = [line for line in list(lines)[SETTLING:] if line.get("valid")]
-        stars = [int(line["matched"] or 0) for line in good] or [0]
-        spread = scatter(good)
-        ra, dec, roll = (
-            spread.get(f"{angle}_deg", (0, np.nan, 0))[1] for angle in ("ra", "dec", "roll")
-        )
-        across = np.hypot(ra * np.cos(np.radians(LATITUDE_DEG)), dec)
-        valid = 100 * len(good) / max(frames, 3)
-        if valid >= LEAST_VALID and max(roll, across) <= MOST_SCATTER_DEG:
-            found.append((ra, dec, roll, across, min(stars), max(stars), valid))
-    if not found:
-        return {}
-    columns = np.array(found).T
-    pooled, means = np.sqrt(np.mean(columns[:4] ** 2, axis=1)), columns[4:].mean(axis=1)
-    names = ("ra", "dec", "roll", "across", "fewest", "most", "valid")
-    # Lines through the angles of each field take two degrees of freedom.
-    sigmas = [deviation(float(one), max(len(found) * (frames - 2), 1)) for one in pooled]
-    return dict(zip(names, [*sigmas, *map(float, means)], strict=True)) | {"fields": len(found)}
+        yield _field(good, max(frames, 3))
+
+
+def _field(good: Sequence[Columns], count: int) -> Field:
+    """Of the lines with an attitude, out of ``count``."""
+    stars = [int(line["matched"] or 0) for line in good] or [0]
+    spread = scatter(good)
+    ra, dec, roll = (
+        spread.get(f"{angle}_deg", (0, np.nan, 0))[1] for angle in ("ra", "dec", "roll")
+    )
+    across = float(np.hypot(ra * np.cos(np.radians(LATITUDE_DEG)), dec))
+    declination = np.mean([line["dec_deg"] for line in good]) if good else np.nan
+    off_deg = abs(float(declination) - LATITUDE_DEG)
+    return Field(ra, dec, roll, across, min(stars), max(stars), 100 * len(good) / count, off_deg)
 
 
 def choose_threshold(client: CubeStar) -> int:

@@ -22,7 +22,10 @@ from cubestack.host.studies.fidelity.table import Job, perform
 
 #: Of each field: sigma of right ascension, declination and roll, deg; part that is valid.
 CALM, SHAKEN, BLIND = (0.01, 0.02, 0.05, 1.0), (0.01, 2.0, 0.05, 1.0), (0.01, 0.01, 0.01, 0.4)
+OFF_DEG = {6: 40.0}
+"""A field where the node is calm and wrong."""
 GOOD = {0: CALM, 2: (0.03, 0.01, 0.1, 0.5), 5: (0.02, 0.04, 0.02, 0.9)}
+WRONG = {6: CALM}
 
 
 @pytest.fixture
@@ -33,7 +36,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     def log_lines(_client: object, _clock: object, *, count: int, interval_s: float) -> Any:
         field = sum(isinstance(one, SimpleNamespace) for one in seen)
         seen.append(SimpleNamespace(count=count, interval_s=interval_s))
-        sigmas = GOOD.get(field, SHAKEN if field % 2 else BLIND)
+        sigmas = (GOOD | WRONG).get(field, SHAKEN if field % 2 else BLIND)
         valid = round(sigmas[3] * (count - SETTLING))
         for number in range(count):
             sign = (-1) ** number
@@ -42,7 +45,9 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
                 "time_s": float(number),
                 "valid": number < SETTLING + valid,
                 "matched": 8 + number % 5 + field,
-                **dict(zip(("ra_deg", "dec_deg", "roll_deg"), off, strict=True)),
+                "ra_deg": off[0],
+                "dec_deg": off[1] + module.LATITUDE_DEG + OFF_DEG.get(field, 0.0),
+                "roll_deg": off[2],
             }
 
     monkeypatch.setattr(module, "log_lines", log_lines)
