@@ -30,7 +30,7 @@ DOCUMENTS ?=
 # Nothing here is made by a built-in rule: one would make "setup" of setup.sh.
 MAKEFLAGS += --no-builtin-rules
 
-.PHONY: help venv run docs test fuzz test-all test-hdl test-clients test-suites pasted firmware mutants lint wheels bench bench-engines fidelity clean
+.PHONY: help venv run docs test fuzz test-all test-hdl test-clients test-suites pasted firmware mutants lint wheels bench bench-engines bench-history bench-scale fidelity clean
 
 help:
 	@echo "make run       set up, then boot the sensors, measure over their serial ports, and draw what they saw"
@@ -49,6 +49,8 @@ help:
 	@echo "make fidelity  set up, then measure the figures of the documents again, within 20 minutes on two idle cores"
 	@echo "make bench     measure the cost of the hot paths"
 	@echo "make bench-engines  compare the simulators that can run the gateware"
+	@echo "make bench-history  write this version's ratios into docs/benchmarks.md"
+	@echo "make bench-scale  measure what many skies cost, on an idle machine"
 	@echo "make clean     remove .venv, out and caches"
 
 venv: .venv/ready-run
@@ -139,6 +141,16 @@ docs: .venv/ready-compiler
 
 bench-engines: .venv/ready-dev
 	@$(BIN)/python -m tests.benchmarks.engines
+
+bench-history: .venv/ready-dev
+	@OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.history
+
+# Numbers of skies, and the price of a core for an hour.
+FRAMES ?= 10 1000 10000
+PRICE ?= 0.05
+
+bench-scale: .venv/ready-dev
+	@OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.scale $(FRAMES) --price $(PRICE)
 
 clean:
 	rm -rf .venv out build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

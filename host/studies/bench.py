@@ -10,6 +10,7 @@ from typing import Any
 from cubestack.host.cli.arguments import add_flag
 from cubestack.host.devices.registry import devices
 from cubestack.host.emulation.emulated import AnyEmulated
+from cubestack.host.studies.ratios import MEANINGS, device_ratios, light_ratio
 from cubestack.host.terminal import busy, tell
 
 
@@ -30,9 +31,10 @@ ROUNDS = 5
 
 
 def simulated_ratio(emulated: AnyEmulated, run: Callable[[], None]) -> float:
-    virtual, wall = emulated.time_s, time.perf_counter()
+    """Virtual time by processor time, which on an idle machine is wall time."""
+    virtual_s, began_s = emulated.time_s, time.process_time()
     run()
-    return round((emulated.time_s - virtual) / (time.perf_counter() - wall), 2)
+    return round((emulated.time_s - virtual_s) / (time.process_time() - began_s), 2)
 
 
 def best_ms(run: Callable[[], object]) -> float:
@@ -57,15 +59,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         if (benchmark := device.study("bench"))
         for name, meaning in benchmark.figures.items()
     ]
+    lines += [f"{name:<17} {meaning}" for name, meaning in MEANINGS.items()]
     parser.epilog = "\n".join([*lines, "", f"{COMPARISON} (docs/engines.md)"])
 
 
 def run(args: argparse.Namespace) -> int:
-    figures: dict[str, float] = {}
+    figures = light_ratio()
     for device in devices():
         if benchmark := device.study("bench"):
             with busy(f"measuring {device.title}", quiet=args.json):
-                figures |= benchmark.run(device)
+                figures |= benchmark.run(device) | device_ratios(device.name)
     if args.json:
         print(json.dumps(figures))
         return 0

@@ -118,7 +118,7 @@ BENCHMARK = Benchmark(
         "strobes_per_s": "data clocks a second through it, while a picture is read",
         "capture_wall_ms": "wall time of one capture: exposure, read-out, FPGA store",
         "readout_wall_ms": "wall time of one transfer, FPGA's SRAM to processor",
-        "realtime_ratio": "simulated seconds per wall second of the full 1 Hz loop",
+        "realtime_ratio": "simulated seconds per second of processor time of the full 1 Hz loop",
         "instructions_per_s": "of the instruction-set simulator, in an arithmetic loop",
         "unicorn_ratio": "its speed by unicorn's, over nine programs, where unicorn is installed",
         "unicorn_ratio_waits": "the same with the cost of flash wait states, which unicorn lacks",

@@ -22,13 +22,15 @@ from tests.conftest import Run
 
 
 class Clock:
-    """Simulated wall time."""
+    """Simulated wall time, which is the processor's too."""
 
     def __init__(self) -> None:
         self.now_s = 100.0
 
     def perf_counter(self) -> float:
         return self.now_s
+
+    process_time = perf_counter
 
 
 @pytest.fixture
@@ -80,7 +82,7 @@ def built(wiring: Wiring, seconds: float) -> float:
     return seconds
 
 
-def test_ratio_is_virtual_time_per_wall_time(clock: Clock) -> None:
+def test_ratio_is_virtual_time_by_processor_time(clock: Clock) -> None:
     one: Any = Device(clock)
     assert bench.simulated_ratio(one, lambda: one.pause(3.0)) == 4.0
 
@@ -242,15 +244,21 @@ def measured(monkeypatch: pytest.MonkeyPatch) -> None:
     ]
     made[1] = replace(made[1], studies={})
     monkeypatch.setattr(bench, "devices", lambda: made)
+    monkeypatch.setattr(bench, "light_ratio", lambda: {})
+    monkeypatch.setattr(bench, "device_ratios", lambda name: {f"{name}_reuse_ratio": 2.5})
 
 
 @pytest.mark.usefixtures("measured")
 def test_command_measures_every_device_with_a_benchmark(run: Run) -> None:
     first, without, third = BUILT_IN
     found = run("bench", "--json")
-    assert (found.code, json.loads(found.out)) == (0, {first: 1234.5, third: 1234.5})
+    figures = dict.fromkeys((first, third), 1234.5)
+    figures |= {f"{name}_reuse_ratio": 2.5 for name in (first, third)}
+    assert (found.code, json.loads(found.out)) == (0, figures)
     lines = run("bench").out.splitlines()
-    assert [line.split() for line in lines] == [[first, "1,234.5"], [third, "1,234.5"]]
+    assert {tuple(line.split()) for line in lines} == {
+        (name, f"{value:,}") for name, value in figures.items()
+    }
     told = run("bench", "--help").out
     assert f"of {first}" in told
     assert f"of {without}" not in told
