@@ -29,10 +29,11 @@ def quick_ones(cases: Iterable[Any], *names: str) -> list[Any]:
 def todays(turn: int, turns: int, cases: int) -> int:
     """Number of the case that a test runs as its ``turn`` of ``turns``, of 0 to ``cases`` - 1.
 
-    The cases of a day are evenly spread. Each day has others, until every one has been run.
+    The cases of a day are evenly spread. Each day has others, until every one has been run. There
+    are at least as many cases as turns.
     """
-    days = -(-cases // turns)
-    return turn * days + DAY % min(days, cases - turn * days)
+    first, end = turn * cases // turns, (turn + 1) * cases // turns
+    return first + DAY % (end - first)
 
 
 def _slow(case: Any) -> Any:

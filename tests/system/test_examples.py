@@ -89,6 +89,7 @@ def test_bringup_names_the_step_that_fails(device: Any) -> None:
     assert done.stdout.splitlines()[-1].startswith("5 FAIL")
 
 
+@pytest.mark.slow
 def test_driver_suite_passes(tmp_path: Path) -> None:
     suite = tmp_path / "test_my_driver.py"
     shutil.copy(HERE / suite.name, suite)

@@ -22,11 +22,11 @@ from cubestack.hdl.cubesense.sun_search import SunSearch
 from cubestack.hdl.cubesense.sun_window import SunWindow
 from cubestack.hdl.cubesense.top import CubeSenseFpga
 from cubestack.hdl.flow.generate import rtlil_text
-from tests.hdl.regression import SMALLEST, addressable
+from tests.hdl.regression import FULL, SMALLEST, addressable
 from tests.tiers import quick
 
 NAMES = ["modes", "read", "store", "failures"]
-SEEDS = quick([1, 2], 1)
+SEEDS = (1, 2) if FULL else (1,)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -90,7 +90,7 @@ BLOCKS: dict[str, Callable[[ReadOut], Component]] = {
 }
 
 
-@pytest.mark.parametrize("seed", quick([1, 2], 1))
+@pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("block", BLOCKS)
 def test_cubesense_block_passes_its_testbench(
     simulate: Any, read_out: ReadOut, block: str, seed: int

@@ -24,8 +24,8 @@ def process(text: str, **environment: str) -> "subprocess.CompletedProcess[str]"
     )
 
 
-@pytest.mark.parametrize("quiet", [(), ("-q",)])
-def test_missing_compiler_prints_what_to_install(tmp_path: Path, quiet: tuple[str, ...]) -> None:
+@pytest.mark.parametrize("quiet", quick([[], ["-q"]], 1))
+def test_missing_compiler_prints_what_to_install(tmp_path: Path, quiet: list[str]) -> None:
     words = [*quiet, "shell", "emulated:cubestar", "-c", "read Identification"]
     text = (
         "import cubestack.emulator.native.compiler as k\n"
@@ -72,19 +72,23 @@ def test_ascii_locale_replaces_other_characters() -> None:
     assert shown == ["== 1? ==", "+20.08? ?"]
 
 
-@pytest.mark.parametrize("words", [("registers", "cubesense"), ("measure", "cubesense")])
-def test_commands_run_in_an_ascii_locale(words: tuple[str, ...]) -> None:
-    done = process(f"from cubestack.host.cli.main import main; main({list(words)})", **ASCII)
+@pytest.mark.parametrize("command", quick(["registers", "measure"], 1))
+def test_commands_run_in_an_ascii_locale(command: str) -> None:
+    call = f"main([{command!r}, 'cubesense'])"
+    done = process(f"from cubestack.host.cli.main import main; {call}", **ASCII)
     assert done.returncode == 0, done.stderr
     assert done.stdout
 
 
 @pytest.mark.parametrize(
     ("words", "file"),
-    [
-        (["emulated:cubestar", "--scene", "/none.toml"], "/none.toml"),
-        (["/dev/nothing", "--device", "cubestar"], "/dev/nothing"),
-    ],
+    quick(
+        [
+            (["emulated:cubestar", "--scene", "/none.toml"], "/none.toml"),
+            (["/dev/nothing", "--device", "cubestar"], "/dev/nothing"),
+        ],
+        1,
+    ),
 )
 def test_missing_file_or_port_is_named(words: list[str], file: str) -> None:
     ended = subprocess.run([*CALL, "ground", *words], capture_output=True, text=True, timeout=60)
@@ -96,7 +100,7 @@ CONTROLLED = ["emulate", "cubestar", "--tcp", "0", "--control", "0"]
 
 
 @pytest.mark.parametrize("missing", quick(["starlette", "uvicorn", "websockets"], 1))
-@pytest.mark.parametrize("words", [["ground", "emulated:cubestar"], CONTROLLED])
+@pytest.mark.parametrize("words", quick([["ground", "emulated:cubestar"], CONTROLLED], 1))
 def test_missing_dependency_names_the_extra(words: list[str], missing: str) -> None:
     ended = process(
         f"import sys; sys.modules['{missing}'] = None; from cubestack.host.cli.main import main; "
@@ -107,6 +111,9 @@ def test_missing_dependency_names_the_extra(words: list[str], missing: str) -> N
 
 
 SOON_S = 60.0
+
+ENDED = [["ground", "emulated:cubestar"], ["demo", "--out", "{folder}"]]
+"""Commands that start an emulation in another process."""
 
 
 def begun(until: str, *words: str) -> "subprocess.Popen[str]":
@@ -126,7 +133,7 @@ def heard() -> None:
         signal.signal(number, signal.SIG_DFL)
 
 
-@pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize("number", quick([signal.SIGHUP, signal.SIGTERM, signal.SIGINT], 1))
 def test_signal_removes_the_pty_link(number: signal.Signals, tmp_path: Path) -> None:
     link = tmp_path / "tty"
     with begun("serves on", "emulate", "cubestar", "--pty", str(link)) as process:
@@ -139,9 +146,9 @@ def test_signal_removes_the_pty_link(number: signal.Signals, tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize("number", quick([signal.SIGKILL, signal.SIGTERM], 1))
-@pytest.mark.parametrize("words", [("ground", "emulated:cubestar"), ("demo", "--out", "{folder}")])
+@pytest.mark.parametrize("words", quick(ENDED, 1))
 def test_signal_ends_the_emulation_process(
-    words: tuple[str, ...], number: signal.Signals, tmp_path: Path
+    words: list[str], number: signal.Signals, tmp_path: Path
 ) -> None:
     with begun("Ctrl-C", *(word.format(folder=tmp_path) for word in words)) as process:
         (child,) = children(process.pid)

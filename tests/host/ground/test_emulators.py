@@ -86,6 +86,7 @@ def test_page_runs_and_changes_own_gateware() -> None:
         own.close()
 
 
+@pytest.mark.slow
 def test_restart_runs_uploaded_firmware(session: TargetSession, served: Serving) -> None:
     content = base64.b64encode(reference_image().read_bytes()).decode()
     own = {"name": "../../my <own>.elf", "content": content}

@@ -124,6 +124,7 @@ def test_register_uart_leaves_the_node_protocol_to_i2c(ready: Open) -> None:
     target.close()
 
 
+@pytest.mark.slow
 def test_bench_download_equals_the_camera_image(ready: Open) -> None:
     with ready() as opened:
         line = opened.board.serial("bench_uart")

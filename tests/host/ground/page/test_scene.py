@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from cubestack.firmware_model.reference.image import reference_image
-from tests.tiers import quick
 
 from ..browser import HOSTILE, LOOKS, check_layout, hostile, look, shown
 
@@ -204,7 +203,8 @@ def test_directions_are_compared_with_the_truth(page: Any) -> None:
     assert {"nadir_error_deg", "sun_error_deg", "sun_alpha_error_deg"} <= set(header)
 
 
-@pytest.mark.parametrize(("scheme", "width"), quick(LOOKS, 1))
+@pytest.mark.slow
+@pytest.mark.parametrize(("scheme", "width"), LOOKS)
 def test_scene_form_fits_the_screen(chromium: Any, address: str, scheme: str, width: int) -> None:
     size = {"width": width, "height": 850}
     with shown(chromium, address, viewport=size, color_scheme=scheme) as page:

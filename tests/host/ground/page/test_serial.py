@@ -65,6 +65,7 @@ def test_wrong_baud_rate_is_reported(chromium: Any, tmp_path: Path, recorded: An
         assert told in line(page, "read Configuration")
 
 
+@pytest.mark.slow
 def test_page_recovers_from_an_unplugged_cable(
     chromium: Any, tmp_path: Path, recorded: Any
 ) -> None:

@@ -148,6 +148,7 @@ def test_todays_stored_curve_is_the_same() -> None:
         assert recorded.figures(list(run_jobs(jobs, 1))) == one.figures
 
 
+@pytest.mark.slow
 def test_out_writes_images_curves_and_points(tmp_path: Path, run: Run) -> None:
     arguments = ("--hazard", "gradient", "--frames", "1", "--workers", "1", "--out", tmp_path)
     lines = run("hazards", "cubestar", *arguments, "--json").out.splitlines()
