@@ -1,7 +1,7 @@
 """Cost of CubeStar's program as compiled code: operations, and the phases of one image."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -74,11 +74,9 @@ def _cases(levels: Sequence[str], precisions: Sequence[str]) -> Iterator[_Case]:
                 yield _Case(build, Timing(**waits))
 
 
-def picture() -> NDArray[np.uint8]:
-    """The image to process, as the emulated camera captures it."""
-    from dataclasses import replace
-
-    scene = replace(SkyScene.pointing(*POINTING_DEG), mag_limit=MAG_LIMIT)
+def picture(scene: SkyScene | None = None) -> NDArray[np.uint8]:
+    """The image to process, as the emulated camera captures it; the default has 20 centroids."""
+    scene = scene or replace(SkyScene.pointing(*POINTING_DEG), mag_limit=MAG_LIMIT)
     with power_up(device("cubestar"), scene) as emulated:
         emulated.client.take_picture()
         camera = getattr(emulated.board, "camera", None)
