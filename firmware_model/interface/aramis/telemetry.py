@@ -50,7 +50,7 @@ _FLAGS = {
     "CatalogueMissing": (24, "the flash holds no catalogue"),
     "CatalogueDamaged": (25, "a word of the catalogue had more than one wrong bit"),
     "CatalogueCorrected": (26, "words of the catalogue were corrected on loading"),
-    "RamError": (27, "the catalogue in RAM was damaged and reloaded"),
+    "RamError": (27, "the catalogue in RAM was damaged, and mended or reloaded"),
     "UploadError": (28, "catalogue with a wrong length, checksum or contents, or a stray block"),
     "ConfigError": (29, "settings in flash were damaged; reset values are in use"),
 }
@@ -89,7 +89,7 @@ def _group(bit: int) -> str:
 PHASES = {
     "Setup": "setting up the camera",
     "Capture": "waiting for the frame and its transfer by DMA",
-    "Check": "the catalogue's checksum in RAM",
+    "Check": "the catalogue in RAM checked",
     "Threshold": "mean and noise of the last five images, mask of the bright pixels",
     "Spikes": "removing spikes from the mask",
     "Centroids": "regions and their centroids",

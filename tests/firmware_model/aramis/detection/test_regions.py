@@ -181,6 +181,20 @@ def test_spike_removal_keeps_stars(method: SpikeRemoval) -> None:
     assert run(spikes | star, method)[40:50, 40:50].sum() > 90
 
 
+@pytest.mark.parametrize(
+    ("place", "beside", "across"), [(20, 25, 25), (21, 20, 16), (22, 15, 0), (23, 15, 0)]
+)
+def test_window_method_loses_a_spot_on_the_corner_of_windows(
+    place: int, beside: int, across: int
+) -> None:
+    """5 x 5 pixels off the grid in one direction, then in both."""
+    for column, kept in ((20, beside), (place, across)):
+        spot = np.zeros((50, 50), dtype=bool)
+        spot[place : place + 5, column : column + 5] = True
+        assert run(spot, SpikeRemoval.WINDOW).sum() == kept
+        assert run(spot, SpikeRemoval.CENTRE)[place + 2, column + 2]
+
+
 def test_spike_filter_keeps_13_pixels_of_a_window_and_removes_12() -> None:
     mask = np.zeros((15, 15), dtype=bool)
     mask[5:10, 5:10].flat[:13] = True
