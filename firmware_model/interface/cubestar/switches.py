@@ -92,7 +92,7 @@ class CubeStarSwitches(Switches):
         "printed",
         source="section 4.4: Gaussian elimination of one system",
         reason="near a rotation by 180 deg from the inertial axes the printed system is nearly "
-        "singular, and the attitude wrong; rotated solves the best of four turned systems",
+        "singular and rounding grows; rotated solves the best of four turned systems",
     )
     following: str = switch(
         "search of the image after one that was solved",

@@ -53,7 +53,7 @@ def _processed(device: CubeStarEmulated) -> Shot:
 
 
 def following(opened: CubeStarOpener, frames: int, search: str, rate_deg_s: float) -> Figures:
-    """While turning across the boresight, images a second apart; of those after the first, rates
+    """While turning across the boresight, images one second apart; of those after the first, rates
     in percent and the longest and mean time of matching in ms."""
     times, shots = list[float](), list[Shot]()
     switched = replace(opened, board={**opened.board, "set": f"following={search}"})

@@ -92,7 +92,7 @@ def test_printed_equation_fails_near_180_deg() -> None:
     for off_deg in (10.0, 1.0, 0.1):
         turn = Rotation.from_rotvec(np.radians([0, 180 - off_deg, 0])).as_matrix()
         errors.append(angle_deg(attitude_of(printed(body, body @ turn, Meter(CORTEX_M3))), turn))
-    assert errors[0] < 0.01
+    assert max(errors[:2]) < 0.01
     assert errors[2] > 10 * errors[0]
     half = np.diag([-1.0, 1.0, -1.0])
     with pytest.raises(AttitudeError, match="singular"):
