@@ -27,6 +27,7 @@ from cubestack.emulator.scene.picture import PictureScene, load_picture
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.firmware_model.values import whole
 from cubestack.host.calibration.camera import Camera, load_camera, save_camera
+from cubestack.host.calibration.star_log import load_sights
 from cubestack.host.calibration.stars import PARAMETERS, Fit, Sight, fit_camera
 from cubestack.host.cli.measure import add_devices, run_experiment
 from cubestack.host.clients.contract import DeviceClient, FoundStar
@@ -57,6 +58,12 @@ class CalibrateOptions(Options):
         metavar="N",
         group="pictures",
     )
+    stars: Path | None = path_option(
+        None,
+        "identified stars that a unit has reported: per line a JSON list of [Hipparcos number, "
+        "column, row]",
+        group="pictures",
+    )
     camera: Path | None = path_option(
         None, "JSON with a rough f_px, cx_px, cy_px, k1, k2, p1, p2; default: the device's tables"
     )
@@ -67,13 +74,17 @@ class CalibrateOptions(Options):
 
     def check(self) -> None:
         """A scene needs emulated images; the camera's file must be writable."""
-        if self.images is not None and self.scene is not None:
+        if not self.is_emulated and self.scene is not None:
             raise ValueError("--scene requires --emulated: it sets the unit's lens")
         if self.out is not None and (self.out.suffix != ".json" or not self.out.parent.is_dir()):
             raise ValueError(f"--out must be a file NAME.json in a folder that is, not {self.out}")
         drawn = self.residuals
         if drawn is not None and drawn.exists() and not is_from(CALIBRATE, drawn):
             raise ValueError(f"{drawn} exists, and shows no residuals; choose another --out")
+
+    @property
+    def is_emulated(self) -> bool:
+        return self.images is None and self.stars is None
 
     @property
     def residuals(self) -> Path | None:
@@ -120,7 +131,7 @@ class CalibrateResult(Result):
     before_px: float
     after_px: float
     #: root mean square distance of the fitted camera from the emulated unit's lens over the
-    #: picture, at the best rotation; None for pictures of an unknown lens
+    #: picture, at the best rotation; None for an unknown lens
     lens_px: float | None
 
 
@@ -167,26 +178,31 @@ class StarCalibration(
     ) -> Iterator[CalibrateResult]:
         given = options.camera
         guess = camera = self._like(self.tables()) if given is None else load_camera(given)
-        looks = self._looks(options)
-        for number in range(options.rounds):
-            label = f"identifying stars, round {number + 1}"
-            pictures = self._sights(opened, options.seed, looks, camera)
-            sights = list(opened.shown(pictures, len(looks), label))
+        if options.stars is not None:
+            sights = load_sights(options.stars)
             fit = fit_camera(sights, camera, self.free)
             camera = fit.camera
+        else:
+            looks = self._looks(options)
+            for number in range(options.rounds):
+                label = f"identifying stars, round {number + 1}"
+                pictures = self._sights(opened, options.seed, looks, camera)
+                sights = list(opened.shown(pictures, len(looks), label))
+                fit = fit_camera(sights, camera, self.free)
+                camera = fit.camera
         before = fit_camera(sights, guess, ()).after_px
         if options.out is not None and options.residuals is not None:
             save_camera(camera, options.out)
             save_residuals(fit.places, fit.residuals, options.residuals)
         lens_px = None
-        if options.images is None:
+        if options.is_emulated:
             lens_px = self._over_picture(self.condition(options).optics, camera, ()).after_px
         yield CalibrateResult(
             camera=asdict(camera),
             sigma=fit.sigma,
             pairs_f_px=fit.pairs_f_px,
             pictures=fit.pictures,
-            tried=len(looks),
+            tried=len(sights),
             stars=len(fit.places),
             rejected=fit.rejected,
             before_px=before,

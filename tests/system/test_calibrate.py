@@ -1,11 +1,21 @@
 import json
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from PIL import Image
 
+from cubestack.emulator.camera.common.hazards.lenses import PrincipalPoint
+from cubestack.emulator.camera.common.view import SkyView
+from cubestack.emulator.camera.mlx75412.lens import CONDITION
+from cubestack.emulator.scene.attitude import random_quaternion
+from cubestack.emulator.scene.sky import SkyScene
 from cubestack.host.calibration.camera import load_camera
+from cubestack.host.calibration.star_log import star_line
 from cubestack.host.cli.main import main
+from cubestack.host.devices.registry import device
+from cubestack.host.emulation.emulated import power_up
 
 UNIT = """
 kind = "sky"
@@ -42,6 +52,25 @@ def test_calibrate_finds_the_lens_of_an_emulated_cubestar(
         assert picture.width > 900
 
 
+def test_calibrate_finds_a_principal_point_from_stars_that_a_unit_reports(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """The unit has the tables' camera, and its lens is 8 px to the right."""
+    file, rng = tmp_path / "stars.jsonl", np.random.default_rng(5)
+    moved = PrincipalPoint(px=8.0)
+    with power_up(device("cubestar"), None, profile="extended") as emulated, file.open("w") as log:
+        for number in range(8):
+            sky = SkyScene(random_quaternion(rng))
+            emulated.scene = SkyView(sky, replace(CONDITION, hazards=(moved,), seed=number))
+            emulated.client.capture_and_process()
+            log.write(star_line(emulated.client.stars()) + "\n")
+    found, tables = calibrate(capsys, "--stars", file), CONDITION.optics
+    assert found["camera"]["cx_px"] == pytest.approx(tables.cx + 8, abs=0.7)
+    assert found["camera"]["cy_px"] == pytest.approx(tables.cy, abs=0.7)
+    assert found["after_px"] < 0.15
+    assert found["lens_px"] is None
+
+
 @pytest.mark.slow
 def test_calibrate_finds_the_camera_of_photographs(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, photographs: Path
@@ -67,6 +96,8 @@ def test_calibrate_finds_the_camera_of_photographs(
         (("--images", "{tmp}/small.png"), "is 8 x 8 pixels; with crop 0,0"),
         (("--images", "{tmp}/dark.tiff"), "needs 3 pictures with 5 identified stars or more; of 1"),
         (("--images", "{tmp}", "--scene", "x.toml"), "--scene requires --emulated"),
+        (("--stars", "{tmp}/s.jsonl", "--scene", "x.toml"), "--scene requires --emulated"),
+        (("--stars", "{tmp}/s.jsonl"), "s.jsonl: line 1"),
     ],
 )
 def test_invalid_arguments_print_one_line(
@@ -74,6 +105,7 @@ def test_invalid_arguments_print_one_line(
 ) -> None:
     Image.new("L", (8, 8)).save(tmp_path / "small.png")
     Image.new("L", (1024, 512)).save(tmp_path / "dark.tiff")
+    (tmp_path / "s.jsonl").write_text("[[1, 2]]", "utf-8")
     told = [argument.replace("{tmp}", str(tmp_path)) for argument in arguments]
     assert main(["calibrate", "cubestar", *told]) == 2
     said = capsys.readouterr().err

@@ -24,6 +24,7 @@ LEFT = {
     r"program\.elf|picture\.elf": "firmware: tests/system/firmware/test_own_firmware.py",
     r"settings\.elf": "firmware: tests/host/studies/powerfail/test_settings_store.py",
     r"sky\.jpg|night/|bench/": "needs photographs",
+    r"stars\.jsonl": "needs stars of a unit: tests/system/test_calibrate.py",
     r"qemu-system-arm|\./star_tracker": "programs of others: tests/system/serial_programs",
     r"flight": "the reader's flight software",
     r"binned:Binned": "in its folder: examples/own_gateware/tests",
