@@ -52,6 +52,7 @@ OWN = {
     "host/studies/fidelity/text.py": "our documents",
     "host/studies/fidelity/table.py": "our package",
     "host/studies/hazards/command.py": "our documents",
+    "host/studies/lens_errors.py": "our documents",
     "host/studies/rows/record.py": "our documents",
     "host/studies/rows/sources.py": "our sources",
 }

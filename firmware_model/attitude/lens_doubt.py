@@ -8,24 +8,20 @@ differ, skew), principal point, distortion. Lenses differ in how large each erro
 - a lens within the tolerance of its calibration, with and without another principal point;
 - a lens that is not the one described: rare, and with errors far beyond the tolerance.
 
-The covariance is that of the mixture of all, about the attitude that is reported: a lens that the
-picture does not exclude counts in proportion to its probability. So a tolerance widens the claim
-and refuses nothing; refused is only another lens that has won, if the boresight stays uncertain.
+Refused is only another lens that has won, if the mixture of all lenses by their probabilities
+leaves the boresight uncertain. A tolerance refuses nothing: it widens the claim (``lens_claim``).
 """
 
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from cubestack.firmware_model.attitude.lens_fit import (
-    FittedLens,
-    LensStars,
-    Rays,
-    probabilities,
-    small_turn,
-)
+from cubestack.firmware_model.attitude.lens_claim import claimed_covariance
+from cubestack.firmware_model.attitude.lens_evidence import Evidence, evidence, fitted_lenses
+from cubestack.firmware_model.attitude.lens_fit import FittedLens, LensStars, Rays, small_turn
 from cubestack.firmware_model.attitude.lens_models import (
     COUNT,
+    DESCRIBED,
     FOCAL_PX,
     Floats,
     LensErrors,
@@ -44,8 +40,9 @@ SHOWN = 10.0  #: sigmas that another principal point must be displaced by to be 
 #: Standard deviation across the boresight above which another lens is refused, in rad: three of
 #: them are 0.1 deg.
 LARGEST_SIGMA_RAD = 5.8e-4
+STILL = 2.0  #: factor of the tolerance's variance beside it, for a lens that keeps its boresight
 
-CONTRADICTED = 100.0  #: spread with another focal length from which on nothing is known
+CONTRADICTED = 80.0  #: spread with another focal length from which on nothing is known
 WON = 0.9  #: probability from which on another lens is believed
 ODDS = 1000.0  #: of another principal point, below which the boresight stays as described
 
@@ -58,16 +55,17 @@ class LensVerdict:
     covariance: Floats  #: (3, 3) of the small rotation's error about the camera's axes, rad^2
     model: LensModel | None = None  #: the lens that is believed; None: as described
     error_px: Reals = field(default_factory=lambda: np.zeros(COUNT))  #: fitted, as ``sizes_px``
-    tolerated: float = 0.0  #: variance across the boresight by the tolerance alone, rad^2
+    across: float = 0.0  #: larger variance across the boresight by the lenses' probabilities, rad^2
+    tolerated: float = 0.0  #: the same by the tolerance alone
     contradicts: bool = False  #: a significant focal length that explains little
 
     @property
     def is_refused(self) -> bool:
         """Whether it is another lens, and either not known or the boresight too uncertain."""
-        across = max(self.covariance[0, 0], self.covariance[1, 1])
-        is_uncertain = bool(across > LARGEST_SIGMA_RAD**2 + self.tolerated)
-        is_other = self.model is not None and self.model.is_other
-        return self.contradicts or (is_other and is_uncertain)
+        if self.model is None or not self.model.is_other:
+            return self.contradicts
+        tolerated = self.tolerated * (1.0 if self.model.moves_boresight else STILL)
+        return self.contradicts or self.across > LARGEST_SIGMA_RAD**2 + tolerated
 
 
 def judge_lens(
@@ -104,30 +102,37 @@ def judge_lens(
     stars = LensStars(
         pixels, reference.astype(float), errors, rays, centre, pixel_rad, meter, start
     )
-    fits = stars.fits(lenses(tolerance, 0.0 if fit.scale == 1.0 else FOCAL_PX))
-    common, shares = probabilities(fits, meter)
-    chosen = _chosen(fits, shares)
-    covariance = np.zeros((3, 3))
-    meter.charge(f32_mul=45 * len(fits), f32_add=36 * len(fits), loop=len(fits))
-    for one, share in zip(fits, shares, strict=True):
-        off = small_turn(one.rotation @ chosen.rotation.T)
-        wider = common * (1 + stars.rest(one))
-        covariance += share * (one.covariance[:3, :3] * wider + np.outer(off, off))
+    fits = fitted_lenses(stars, lenses(tolerance, 0.0 if fit.scale == 1.0 else FOCAL_PX))
+    found = evidence(fits, meter)
+    chosen = _chosen(fits, found.probabilities)
     if not len(chosen.model.columns):
-        covariance += fit.covariance * shares[[one is chosen for one in fits]].sum()
-        return LensVerdict(fit.quaternion, covariance.astype(np.float32))
+        claimed = claimed_covariance(stars, fits, found, chosen, start)
+        return LensVerdict(fit.quaternion, claimed.astype(np.float32))
     try:
         quaternion = stars.attitude(chosen)
     except AttitudeError:
         return described
+    reported = dcm(quaternion, meter).astype(float)
     return LensVerdict(
         quaternion,
-        covariance.astype(np.float32),
+        claimed_covariance(stars, fits, found, chosen, reported).astype(np.float32),
         chosen.model,
         chosen.error_px,
+        _across(stars, fits, found, chosen),
         stars.variance(LensErrors(point=tolerance.point)),
-        contradicts=chosen is fits[0] and chosen.spread > CONTRADICTED,
+        contradicts=chosen is fits[DESCRIBED] and chosen.spread > CONTRADICTED,
     )
+
+
+def _across(stars: LensStars, fits: list[FittedLens], found: Evidence, chosen: FittedLens) -> float:
+    """Larger variance across the boresight, about the attitude of the lens that is believed."""
+    stars.meter.charge(f32_mul=10 * len(fits), f32_add=8 * len(fits), loop=len(fits))
+    across = np.zeros(2)
+    for one, share in zip(fits, found.probabilities, strict=True):
+        off = small_turn(one.rotation @ chosen.rotation.T)[:2]
+        wider = found.common * (1 + stars.rest(one))
+        across += share * (np.diag(one.covariance)[:2] * wider + off * off)
+    return float(across.max())
 
 
 def _agrees(
@@ -138,12 +143,13 @@ def _agrees(
     tolerance: LensErrors,
     meter: Meter,
 ) -> bool:
-    """Whether stars are where the lens as described puts them, and would not be with another
-    principal point: its residuals are of second order in the field angle."""
+    """Whether stars are where the lens as described puts them, focal length included, and would
+    not be with another principal point: its residuals are of second order in the field angle."""
+    if fit.scale != 1.0:
+        return False
     count = len(pixels)
     meter.charge(f32_mul=6 * count + 4, f32_add=8 * count, f32_div=2 * count + 3, f32_sqrt=2)
-    freedom = 2 * count - 3 - (fit.scale != 1.0)
-    calm = np.sum((fit.residuals / errors) ** 2) <= CALM * freedom
+    calm = np.sum((fit.residuals / errors) ** 2) <= CALM * (2 * count - 3)
     angles2 = np.sum(np.var(pixels, axis=0)) * pixel_rad**2
     error_px = np.sqrt(np.mean(errors**2) / count) / pixel_rad
     return bool(calm and tolerance.point * angles2 > SHOWN * error_px)

@@ -1,12 +1,4 @@
-"""An attitude fitted together with errors of the lens, and the evidence of each kind of lens.
-
-The evidence is the likelihood of the fit, times the share of the usual sizes of the errors that the
-picture leaves (Laplace's approximation; D. MacKay, "Information Theory, Inference, and Learning
-Algorithms", chapter 28).
-
-Stars' errors beyond the declared ones that no lens explains are taken to be common to neighbouring
-stars: they then count as fewer observations.
-"""
+"""An attitude fitted together with errors of the lens."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -30,16 +22,10 @@ Rays = Callable[[Floats], Floats]  #: unit vectors (n, 3) of pixels (n, 2)
 
 EXPLAINED = 1.1  #: spread up to which nothing is left to explain,
 TESTED = 1.25  #: if there are this many coordinates of stars per fitted parameter
-COMMON = 4.0  #: further observations that one star's unexplained error makes worthless (chosen)
-UNEXPLAINED = 3.0  #: spread from which on errors count as unexplained
 REST = 0.01  #: of a calibration's errors, the share that the nine do not describe (chosen)
 
-POSSIBLE = 1e-3  #: probability from which on a lens is fitted again
-SMALL_PX = 1.0  #: a step of the lens' errors after which another round changes nothing that counts
-
-_PRIOR_DEGREES = 6.0  #: observations that the declared errors count for
+PRIOR_DEGREES = 6.0  #: observations that the declared errors count for
 _STEP_PX = np.float32(0.5)
-_LOGARITHM = {"f32_mul": 11, "f32_add": 11, "f32_div": 1}  # a polynomial of eleven terms
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,15 +82,6 @@ class LensStars:
         squares = np.sum(apart * apart, axis=1) / self.sigmas**2
         spread = max(1.0, float(np.median(squares)) / 2 / HALF_CHI2)
         return self._equations(design, apart, _weights(squares, spread))
-
-    def fits(self, models: tuple[LensModel, ...]) -> list[FittedLens]:
-        """The lenses fitted from the start; those that are possible and moved far, once more."""
-        found = [self.fit(model) for model in models]
-        _, shares = probabilities(found, self.meter)
-        return [
-            self.fit(one.model, one) if share > POSSIBLE and one.step_px > SMALL_PX else one
-            for one, share in zip(found, shares, strict=True)
-        ]
 
     def fit(self, model: LensModel, last: FittedLens | None = None) -> FittedLens:
         """A lens fitted from the start, or from its last fit. Stars far from their places weigh
@@ -201,34 +178,6 @@ class LensStars:
         )
 
 
-def probabilities(fits: list[FittedLens], meter: Meter) -> tuple[float, Reals]:
-    """Observations that one star's error makes worthless, itself among them, and the probability
-    of each lens."""
-    for one in fits:  # a product of the stars, a determinant; three logarithms, an exponential
-        count, size = len(one.squares), len(one.model.columns)
-        products = count + size**3 // 3 + 2 * size
-        meter.charge(f32_mul=products, f32_add=products, f32_div=2 * count + 2 * size)
-        meter.charge(**{name: 4 * each for name, each in _LOGARITHM.items()})
-    common = 1 + COMMON * (1 - 1 / max(1.0, min(one.spread for one in fits) / UNEXPLAINED))
-    logs = np.array([_evidence(one, common) for one in fits])
-    shares = np.exp(logs - logs.max())
-    return common, shares / shares.sum()
-
-
-def _evidence(fitted: FittedLens, common: float) -> float:
-    """Logarithm of the probability of a lens, up to a constant; see the module."""
-    model, spread = fitted.model, fitted.spread
-    observations = 2 * len(fitted.squares) - 3 + _PRIOR_DEGREES
-    likelihood = -(TAILS + 2) / 2 * np.log1p(fitted.squares / spread / TAILS).sum()
-    log = np.log(model.prior) + (likelihood - observations / 2 * np.log(spread)) / common
-    if len(model.columns):
-        usual, errors = model.sizes.sizes_px[model.columns], fitted.error_px[model.columns]
-        log -= float(np.sum((errors / usual) ** 2)) / 2
-        left = fitted.covariance[3:, 3:] * common / np.outer(usual, usual)
-        log += np.linalg.slogdet(left)[1] / 2
-    return float(log)
-
-
 def _weights(squares: Reals, spread: float) -> Reals:
     return np.minimum((TAILS + 2) / (TAILS + squares / spread), 1)
 
@@ -236,7 +185,7 @@ def _weights(squares: Reals, spread: float) -> Reals:
 def _spread(squares: Reals, weights: Reals, fitted: float) -> float:
     """Variance of the residuals, of the declared one, at least 1; ``fitted`` parameters."""
     freedom = max(2 * len(squares) - fitted, 0.0)
-    return max(1.0, float((_PRIOR_DEGREES + weights @ squares) / (_PRIOR_DEGREES + freedom)))
+    return max(1.0, float((PRIOR_DEGREES + weights @ squares) / (PRIOR_DEGREES + freedom)))
 
 
 def _turn(vector: Reals) -> Reals:

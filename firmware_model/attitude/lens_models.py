@@ -11,6 +11,8 @@ Reals = NDArray[np.float64]
 UNIT_PX = 512.0  #: distance from the principal point at which errors of the lens are given in px
 COUNT = 9  #: errors of a lens
 
+DESCRIBED, TOLERATED, LARGEST = 0, 3, -1  #: places in ``lenses``: with no error, all tolerated, all
+
 FOCAL_PX = 15.0  #: usual size of a significant error of the focal length, as of the others below
 
 

@@ -230,7 +230,6 @@ class Processing:
         """The attitude with the weights that the switches select. Raises AttitudeError."""
         stars = self.catalogue.vectors
         if self._switches.estimate == "votes":
-            rotated = self._switches.equation == "rotated"
-            return by_votes(self.results, identification, stars, self.meter, rotated=rotated)
+            return by_votes(self.results, identification, stars, self.meter)
         camera = configuration.camera_parameters(self.state.settings)
         return by_errors(self.results, identification, stars, camera, self.meter)

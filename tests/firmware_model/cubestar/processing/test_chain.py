@@ -70,8 +70,7 @@ def test_quest_weights_follow_the_confirmation(
 ) -> None:
     given: list[np.ndarray] = []
 
-    def weigh(*arguments: np.ndarray, rotated: bool) -> np.ndarray:
-        assert rotated
+    def weigh(*arguments: np.ndarray) -> np.ndarray:
         given.extend(arguments[:3])
         return np.array([0, 0, 0, 1], np.float32)
 
