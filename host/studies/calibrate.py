@@ -27,7 +27,6 @@ from cubestack.emulator.scene.picture import PictureScene, load_picture
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.firmware_model.values import whole
 from cubestack.host.calibration.camera import Camera, load_camera, save_camera
-from cubestack.host.calibration.star_log import load_sights
 from cubestack.host.calibration.stars import PARAMETERS, Fit, Sight, fit_camera
 from cubestack.host.cli.measure import add_devices, run_experiment
 from cubestack.host.clients.contract import DeviceClient, FoundStar
@@ -36,6 +35,7 @@ from cubestack.host.experiments.opener import Opener
 from cubestack.host.options import Options, output_option, path_option
 from cubestack.host.pictures.files import CALIBRATE, is_from
 from cubestack.host.pictures.images import save_residuals
+from cubestack.host.studies.star_log import load_sights
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff")
 DEFAULT_PICTURES = 20

@@ -12,10 +12,10 @@ from cubestack.emulator.camera.mlx75412.lens import CONDITION
 from cubestack.emulator.scene.attitude import random_quaternion
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.host.calibration.camera import load_camera
-from cubestack.host.calibration.star_log import star_line
 from cubestack.host.cli.main import main
 from cubestack.host.devices.registry import device
 from cubestack.host.emulation.emulated import power_up
+from cubestack.host.studies.star_log import star_line
 
 UNIT = """
 kind = "sky"

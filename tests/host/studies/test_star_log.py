@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from cubestack.emulator.scene.hipparcos import load_sky
-from cubestack.host.calibration.star_log import load_sights, star_line
 from cubestack.host.errors import CameraFileError
+from cubestack.host.studies.star_log import load_sights, star_line
 
 SIRIUS, VEGA = 32349, 91262
 
