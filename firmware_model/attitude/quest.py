@@ -45,6 +45,7 @@ def quest(
     meter: Meter,
     *,
     eigenvalue: Eigenvalue | None = None,
+    rotated: bool = True,
 ) -> NDArray[np.float32]:
     """Quaternion (4,), scalar last and not negative, of the rotation reference to measured.
 
@@ -53,6 +54,7 @@ def quest(
         weights: (n,) not negative, not all zero; in the thesis votes of the verification.
         meter: charged with every operation.
         eigenvalue: finds the largest eigenvalue; None takes 1, as the thesis does.
+        rotated: False solves equation 4.4.9 as printed, however near to singular it is.
 
     Raises:
         AttitudeError: for fewer than two vectors, weights of 0, or vectors in one direction.
@@ -67,13 +69,13 @@ def quest(
         raise AttitudeError("the weights of the vectors add up to 0")
     profile /= total
     largest = np.float32(1) if eigenvalue is None else eigenvalue(profile, meter)
-    choices = [_system(profile * signs, largest, meter) for signs in _TURNS]
-    determinants = [_determinant(matrix, meter) for matrix, _ in choices]
-    turn = int(np.argmax(determinants))
-    meter.charge(f32_add=len(weights), f32_div=9, f32_compare=5, loop=len(weights))
-    if determinants[turn] < _SMALLEST_DETERMINANT:
-        raise AttitudeError("the vectors all point the same way: no rotation about it")
+    turns = _TURNS if rotated else _TURNS[:1]
+    choices = [_system(profile * signs, largest, meter) for signs in turns]
+    meter.charge(f32_add=len(weights), f32_div=9, f32_compare=1, loop=len(weights))
+    turn = _best(choices, meter) if rotated else 0
     rodrigues = _eliminate(*choices[turn], meter)
+    if not np.isfinite(rodrigues).all():
+        raise AttitudeError("equation 4.4.9 is singular: a rotation by 180 deg, or one direction")
     squares = np.float32(1)
     for component in rodrigues:
         squares += component * component
@@ -140,6 +142,16 @@ def _system(
     return matrix, right
 
 
+def _best(choices: list[tuple[NDArray[np.float32], NDArray[np.float32]]], meter: Meter) -> int:
+    """The system with the largest determinant."""
+    determinants = [_determinant(matrix, meter) for matrix, _ in choices]
+    turn = int(np.argmax(determinants))
+    meter.charge(f32_compare=len(choices))
+    if determinants[turn] < _SMALLEST_DETERMINANT:
+        raise AttitudeError("the vectors all point the same way: no rotation about it")
+    return turn
+
+
 def _determinant(m: NDArray[np.float32], meter: Meter) -> np.float32:
     meter.charge(f32_mul=9, f32_add=5, ram_read=9)
     return np.float32(
@@ -157,7 +169,8 @@ def _eliminate(
         pivot = column + int(np.argmax(np.abs(rows[column:, column])))
         rows[[column, pivot]] = rows[[pivot, column]]
         for row in range(column + 1, 3):
-            factor = rows[row, column] / rows[column, column]
+            with np.errstate(divide="ignore", invalid="ignore"):  # singular: checked by the caller
+                factor = rows[row, column] / rows[column, column]
             rows[row, column:] -= factor * rows[column, column:]
     solution = np.zeros(3, dtype=np.float32)
     for row in (2, 1, 0):

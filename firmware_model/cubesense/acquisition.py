@@ -208,6 +208,22 @@ class Acquisition:
         chunks = (self._buffer[: count - at] for at in range(0, count, CHUNK))
         yield from self._strobe(chunks, self._strobe_cycles)
 
+    def mean(self, sram: codes.Sram) -> Routine[int | None]:
+        """Mean of all pixels of the image in ``sram``, rounded down; None as for ``window``.
+
+        Equation 4.1.1. Assumed: a sum of 32 bits, in two additions of 16.
+        """
+        total = 0
+        yield from self.open_image(sram)
+        for _ in range(codes.IMAGE_BYTES // CHUNK):
+            yield from self.read_bytes(self._buffer)
+            total += int(self._buffer.sum(dtype=int))
+            self._meter.charge(i16_add=2 * CHUNK)
+        self._meter.charge(i16_div=2)
+        whole = self.image_open
+        yield from self._standby()
+        return total // codes.IMAGE_BYTES if whole else None
+
     def _strobe(self, chunks: Iterable[NDArray[np.uint8]], cycles: int) -> Routine[None]:
         """Clock bytes into ``chunks``, and check the supply currents from time to time."""
         for chunk in chunks:

@@ -134,8 +134,11 @@ class Measurement:
     def _measure_nadir(self, result: CameraResult, started: int) -> Routine[bool]:
         """The Earth's direction; False if the memory was cut off."""
         settings, switches = self._state.cameras[codes.Camera.NADIR], self._state.switches.now
+        threshold = yield from self._threshold(settings, result.sram)
+        if threshold is None:
+            return False
         config = EdgeConfig(
-            settings.threshold,
+            threshold,
             settings.boresight,
             masks=tuple(settings.masks),
             sub_pixel=switches.edges == "sub-pixel",
@@ -168,6 +171,12 @@ class Measurement:
         result.detect = found.detect
         return True
 
+    def _threshold(self, settings: CameraSettings, sram: codes.Sram) -> Routine[int | None]:
+        """The threshold of bright pixels; None if the memory was cut off."""
+        if self._state.switches.now.threshold == "fixed":
+            return settings.threshold
+        return (yield from self._acquisition.mean(sram))
+
     def _find_edges(self, result: CameraResult, config: EdgeConfig) -> Routine[EdgeList | None]:
         acquisition, sram = self._acquisition, result.sram
         between = BETWEEN.get(self._state.nadir_search)
@@ -188,6 +197,9 @@ class Measurement:
     def _measure_sun(self, result: CameraResult, started: int) -> Routine[bool]:
         """The Sun's direction; False if the memory was cut off."""
         settings = self._state.cameras[codes.Camera.SUN]
+        threshold = yield from self._threshold(settings, result.sram)
+        if threshold is None:
+            return False
         stored = yield from read_ticks()
         data = yield from self._acquisition.window(result.sram)
         if data is None:
@@ -197,7 +209,7 @@ class Measurement:
         _, table = self._tables[codes.Camera.SUN]
         config = sun_centroid.SunConfig(
             table,
-            settings.threshold,
+            threshold,
             settings.boresight,
             masks=tuple(settings.masks),
             printed=self._state.switches.now.sun == "all-pixels",

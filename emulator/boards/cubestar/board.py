@@ -12,6 +12,7 @@ from cubestack.emulator.boards.contract import BoardOptions
 from cubestack.emulator.boards.cubestar.stack import FORCED_RESETS, CubeStarStack
 from cubestack.emulator.boards.node import I2cCameraBus, NodePeripherals
 from cubestack.emulator.camera.common.view import SkyView
+from cubestack.emulator.camera.mlx75412.remap import Remap
 from cubestack.emulator.faults.sites import Sites
 from cubestack.emulator.rtl.factory import EngineKind
 from cubestack.emulator.scene.sky import Scene
@@ -67,10 +68,11 @@ class CubeStarBoard(CubeStarStack):
             baud: rate of the satellite's UART.
             layout: memory layout, with the program for it.
             i2c_address: 7-bit address on the satellite's bus.
-            switches: variants of the program.
+            switches: variants of the program and the camera.
             common: seed, kernel and i2c_bus, see ``Board``.
         """
         super().__init__(scene, engine=engine, layout=layout, **common)
+        self.camera.remap = Remap(switches.remap)
         self._node_link(lambda: self.program.link, baud, i2c_address)
         meter = Meter(CORTEX_M3)
         offer_firmware_loops()

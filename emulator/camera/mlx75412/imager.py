@@ -17,8 +17,9 @@ from cubestack.emulator.camera.common.dark import dark_at, hot_pixels
 from cubestack.emulator.camera.common.hazards import effects
 from cubestack.emulator.camera.common.imager import Imager
 from cubestack.emulator.camera.common.view import SkyCondition
+from cubestack.emulator.camera.mlx75412.remap import Remap, remapped
 from cubestack.emulator.light.noise import FrameNoise
-from cubestack.emulator.light.pixels import NOWHERE, Light, PixelModel
+from cubestack.emulator.light.pixels import NOWHERE, Grey, Light, PixelModel
 from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
 
 ELECTRONS_PER_DN12 = 2.28  # per count of 12 bits (published)
@@ -43,6 +44,7 @@ class Corrections:
     defects: bool = True  # known defective pixels get the mean of their neighbours in the row
     fixed_pattern: bool = True  # most of the fixed pattern is subtracted
     dark: bool = True  # the mean of the dark rows is subtracted
+    remap: Remap = Remap.UPPER_BITS  # from 12 bits to 8
 
 
 def dark_dn12_per_second(temperature_c: float) -> float:
@@ -80,6 +82,20 @@ class Mlx75412Imager(Imager[Corrections]):
     def electrons_per_count(self, settings: Corrections) -> float:
         del settings
         return ELECTRONS_PER_DN12 * DN12_PER_DN8
+
+    def counts(
+        self,
+        light: Light,
+        exposure_s: float,
+        condition: SkyCondition,
+        settings: Corrections,
+        noise: FrameNoise | None,
+    ) -> Grey:
+        if settings.remap is Remap.UPPER_BITS:
+            return super().counts(light, exposure_s, condition, settings, noise)
+        shape = (light.shape[0], light.shape[1])
+        model = self.pixels(shape, exposure_s, condition, settings, noise)
+        return remapped(light, model, settings.remap)
 
     def pixels(
         self,

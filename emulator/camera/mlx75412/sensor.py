@@ -23,6 +23,7 @@ from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.common.view import SkyCondition, SkyView
 from cubestack.emulator.camera.mlx75412.imager import Corrections, Mlx75412Imager
 from cubestack.emulator.camera.mlx75412.lens import CONDITION
+from cubestack.emulator.camera.mlx75412.remap import Remap
 from cubestack.emulator.light.pixels import Grey
 from cubestack.emulator.scene.sky import Scene
 from cubestack.firmware_model.interface.cameras import mlx75412 as chip
@@ -95,6 +96,8 @@ class Mlx75412(StarSensor):
         super().__init__(scene, condition, chip.REGISTERS, crystal_hz)
         self._seed = seed
         self._vsync_before_first_frame = vsync_before_first_frame
+        #: what it does to a pixel while histogram remap and AutoView are both on
+        self.remap = Remap.UPPER_BITS
         self._imager = Mlx75412Imager(seed)
         self._enables = 0
         self._spans: deque[_Span] = deque(maxlen=REMEMBERED)
@@ -187,7 +190,14 @@ class Mlx75412(StarSensor):
         def on(name: str) -> bool:
             return bool(chip.REGISTERS["HARDWARE_FEATURES"].field(name).of(value))
 
-        return Corrections(on("DEFECT_CORRECTION"), on("FPN_CORRECTION"), on("DARK_SUBTRACTION"))
+        viewed = chip.REGISTERS["FIRMWARE_FEATURES"].field("AUTOVIEW")
+        remapped = on("HISTOGRAM_REMAP") and viewed.of(self._registers.active("FIRMWARE_FEATURES"))
+        return Corrections(
+            on("DEFECT_CORRECTION"),
+            on("FPN_CORRECTION"),
+            on("DARK_SUBTRACTION"),
+            self.remap if remapped else Remap.UPPER_BITS,
+        )
 
     def _replan(self, now_ps: int, *, cut: bool) -> None:
         """Drop the spans from ``now_ps`` on; with ``cut``, end the present one too."""

@@ -19,7 +19,11 @@ def cubestack(*words: str) -> "subprocess.CompletedProcess[str]":
 @pytest.mark.cocotb
 @pytest.mark.parametrize(
     ("design", "more"),
-    [("frame_buffer.v", ()), ("parity:Parity", ()), ("binned:Binned", ("--image", "binned"))],
+    [
+        ("frame_buffer.v", ()),
+        pytest.param("parity:Parity", (), marks=pytest.mark.slow),
+        pytest.param("binned:Binned", ("--image", "binned"), marks=pytest.mark.slow),
+    ],
 )
 def test_design_fulfils_the_contract(design: str, more: tuple[str, ...], tmp_path: Path) -> None:
     waves = ("--waves", str(tmp_path))

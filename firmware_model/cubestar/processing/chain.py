@@ -230,6 +230,7 @@ class Processing:
         """The attitude with the weights that the switches select. Raises AttitudeError."""
         stars = self.catalogue.vectors
         if self._switches.estimate == "votes":
-            return by_votes(self.results, identification, stars, self.meter)
+            rotated = self._switches.equation == "rotated"
+            return by_votes(self.results, identification, stars, self.meter, rotated=rotated)
         camera = configuration.camera_parameters(self.state.settings)
         return by_errors(self.results, identification, stars, camera, self.meter)

@@ -61,14 +61,20 @@ class Estimate:
 
 
 def by_votes(
-    results: Results, identification: Identification, vectors: NDArray[np.float32], meter: Meter
+    results: Results,
+    identification: Identification,
+    vectors: NDArray[np.float32],
+    meter: Meter,
+    *,
+    rotated: bool = True,
 ) -> Estimate:
-    """As published; ``vectors`` are the catalogue's (m, 3). Raises AttitudeError."""
+    """As published; ``vectors`` are the catalogue's (m, 3), ``rotated`` as in ``quest``. Raises
+    AttitudeError."""
     kept = identification.matched
     inertial = vectors[identification.stars[kept]]
     weights = identification.votes[kept].astype(np.float32)
     measured = scaled(results.vectors[kept], 1 / identification.scale, meter)
-    return Estimate(quest(measured, inertial, weights, meter), len(kept), None)
+    return Estimate(quest(measured, inertial, weights, meter, rotated=rotated), len(kept), None)
 
 
 def by_errors(

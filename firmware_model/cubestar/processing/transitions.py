@@ -22,7 +22,8 @@ An attitude contradicts the base if the body can not have turned so far since th
 nevertheless if its own false-alarm probability is below `SURE`, or if the next attitude agrees
 with it: so neither a wrong base nor a wrong attitude lasts. Only believed attitudes are reported as
 valid and stored. A base that is older than half a turn takes contradicts nothing; after a power
-cycle there is none.
+cycle there is none. With switch ``following`` set to assisted, a believed attitude leads to
+assisted in both sets.
 """
 
 from dataclasses import replace
@@ -75,7 +76,9 @@ class Automatic:
         return True
 
     def solved(self) -> None:
-        self._state.mode = MatchMode.TRACKING
+        """The next picture is searched near this attitude."""
+        tracked = self._state.switches.now.following == "tracking"
+        self._state.mode = MatchMode.TRACKING if tracked else MatchMode.ASSISTED
 
     def failed(self, mode: MatchMode) -> None:
         """A picture was not identified in ``mode``."""

@@ -62,8 +62,8 @@ _REGISTERS = (
             "HISTOGRAM_REMAP",
             6,
             1,
-            "compresses 12 bits to 8; the model outputs the upper 8 bits in any case",
-            modelled=False,
+            "compresses 12 bits to 8, with AUTOVIEW; by default the model outputs the upper "
+            "8 bits in any case (switch remap)",
         ),
     ),
     _stored(
@@ -89,16 +89,16 @@ _REGISTERS = (
         "0x03 makes written values take effect; reads as 0",
         assumed="reset value; value read; other values have no effect",
     ),
-    _stored(
+    _synced(
         0x8502,
         "FIRMWARE_FEATURES",
         0x00,
         "image processing in the sensor's own software, which fails below 20 MHz",
         assumed="reset value; which of bits 6 and 4 is which",
     ).of(
-        BitField("AUTO_DYNAMIC_RANGE", 4, 1, "with BARRIER_UPDATE"),
-        BitField("AUTO_EXPOSURE", 5, 1, "sets the exposure automatically"),
-        BitField("BARRIER_UPDATE", 6, 1, "with AUTO_DYNAMIC_RANGE"),
+        BitField("AUTO_DYNAMIC_RANGE", 4, 1, "with BARRIER_UPDATE", modelled=False),
+        BitField("AUTO_EXPOSURE", 5, 1, "sets the exposure automatically", modelled=False),
+        BitField("BARRIER_UPDATE", 6, 1, "with AUTO_DYNAMIC_RANGE", modelled=False),
         BitField("AUTOVIEW", 7, 1, "updates the histogram remap"),
     ),
     _synced(0x8518, "CLOCKS_PER_SECOND", 27_000_000, "clock of FRAMES_PER_SECOND in Hz", width=4),

@@ -88,6 +88,17 @@ class CubeSenseSwitches(Switches):
         "takes four times as long, and the thesis' timer would disagree with its oscilloscope",
         hardware=True,
     )
+    threshold: str = switch(
+        "threshold of bright pixels",
+        "fixed",
+        "fixed",
+        "dynamic",
+        source="section 4.1.1: fixed, as the text prefers; dynamic is the mean of all pixels, "
+        "equation 4.1.1, which the text rejects",
+        reason="dynamic replaces the threshold of the telecommand in both cameras' images; the "
+        "processor reads the whole image for it, the FPGA's own threshold for the Sun stays",
+        hardware=True,
+    )
 
 
 DEFAULT_SWITCHES = CubeSenseSwitches()

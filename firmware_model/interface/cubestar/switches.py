@@ -85,5 +85,36 @@ class CubeStarSwitches(Switches):
         "pixel is compared with its surroundings",
     )
 
+    equation: str = switch(
+        "how equation 4.4.9 is solved, with weights of votes",
+        "rotated",
+        "rotated",
+        "printed",
+        source="section 4.4: Gaussian elimination of one system",
+        reason="near a rotation by 180 deg from the inertial axes the printed system is nearly "
+        "singular and rounding grows; rotated solves the best of four turned systems",
+    )
+    following: str = switch(
+        "search of the image after one that was solved",
+        "tracking",
+        "tracking",
+        "assisted",
+        source="section 4.5; assisted is sections 4.3.4 and 4.3.5: the previous attitude in place "
+        "of a hint, as an alternative to tracking",
+        reason="assisted needs three stars and the whole vote, but no slow motion",
+    )
+    remap: str = switch(
+        "8 bits of a pixel, of the camera's 12, with its histogram remap and AutoView on",
+        "upper-bits",
+        "upper-bits",
+        "stretched",
+        "equalized",
+        source="appendix D turns both on for stars, without the algorithm; its second footnote: "
+        "most such features have no effect at this clock",
+        reason="stretched maps the range of the values of a frame to 0 to 255, equalized gives "
+        "each grey value the same number of pixels; both are assumed",
+        hardware=True,
+    )
+
 
 DEFAULT_SWITCHES = CubeStarSwitches()

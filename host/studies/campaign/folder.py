@@ -111,12 +111,15 @@ class Folder:
 
     def rows(self) -> Iterator[Row]:
         """All rows so far, without a torn last line; FolderError names a damaged one."""
+        return (row for row, _ in self._lines())
+
+    def _lines(self) -> Iterator[tuple[Row, bytes]]:
         path = self.path / ROWS
         try:
             for number, line in read_lines(path, LARGEST_ROWS, FolderError):
                 if line.endswith(b"\n"):
                     where = f"{path}, line {number}"
-                    yield _row(parse_json(line, where, FolderError, finite=False), where)
+                    yield _row(parse_json(line, where, FolderError, finite=False), where), line
         except FileNotFoundError:
             return
 
@@ -142,7 +145,22 @@ class Folder:
             raise OSError(error.errno, error.strerror, str(path)) from None
 
     def sort(self) -> None:
-        _replace(self.path / ROWS, map(_line, sorted(self.rows(), key=lambda row: row.key)))
+        """Order the rows by block. Only one block is in memory."""
+        spans, end = list[tuple[tuple[int, int], int, int]](), 0
+        for row, line in self._lines():
+            if not spans or spans[-1][0][0] != row.block:
+                spans.append((row.key, end, end))
+            end += len(line)
+            spans[-1] = (*spans[-1][:2], end)
+        _replace(self.path / ROWS, _texts(self.path / ROWS, sorted(spans)))
+
+
+def _texts(path: Path, spans: Iterable[tuple[object, int, int]]) -> Iterator[str]:
+    """The text from each place of a file to another one."""
+    for _, begin, end in spans:
+        with path.open("rb") as file:
+            file.seek(begin)
+            yield file.read(end - begin).decode()
 
 
 def _row(content: Any, where: str) -> Row:

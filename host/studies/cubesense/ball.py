@@ -8,6 +8,7 @@ examples:
   cubestack ball                                  every 5 deg to 30, 10 pictures each
   cubestack ball --step 1 --samples 100           as published; takes long
   cubestack ball --profile extended --off-axis 1  optic point 1 mm before the axis
+  cubestack ball --first 40 --last 60             a part of the ball is out of the field
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -29,6 +30,9 @@ DIRECTIONS = {"right": (1, 0), "left": (-1, 0), "down": (0, 1), "up": (0, -1)}
 REACH_DEG = 30.0
 """The ball's edge reaches that of the field there (section 7.1)."""
 
+WIDEST_DEG = 90.0
+"""Largest angle of the stage."""
+
 PUBLISHED = "offset 0.12, 0.16, 0.13, 0.15 deg in the four directions; sigma below 0.18 deg"
 """Figures 7.1 and 7.2, shown beside ours; the drawn lenses are fitted to the first."""
 
@@ -37,6 +41,8 @@ PUBLISHED = "offset 0.12, 0.16, 0.13, 0.15 deg in the four directions; sigma bel
 class BallOptions(Options):
     """Options of `cubestack ball`."""
 
+    first: float = number(0.0, "first angle of the stage (default 0)", 0, WIDEST_DEG, "deg")
+    last: float = number(REACH_DEG, f"last one (default {REACH_DEG:g})", 0, WIDEST_DEG, "deg")
     step: float = number(5.0, "of the stage (default 5)", 0.5, 30, "deg")
     samples: int = whole(10, "pictures at each angle (default 10)", 2, metavar="N")
     off_axis: float = number(
@@ -46,7 +52,11 @@ class BallOptions(Options):
 
     @property
     def angles(self) -> list[float]:
-        return [float(angle) for angle in np.arange(0, REACH_DEG + 1e-9, self.step)]
+        return [float(angle) for angle in np.arange(self.first, self.last + 1e-9, self.step)]
+
+    def check(self) -> None:
+        if self.last < self.first:
+            raise ValueError(f"--last must be at least --first, not {self.last:g} < {self.first:g}")
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,10 @@ from cubestack.hdl.cubesense.tops import AREA_FILE
 from cubestack.hdl.flow.area_report import recorded_areas
 from cubestack.host.experiments.cubesense.measure import CubeSenseOpener, SensorResult, view_of
 from cubestack.host.experiments.measure import measure
+from cubestack.host.studies.cubesense import benches
 from cubestack.host.studies.cubesense.ball import EXPERIMENT, BallOptions
+from cubestack.host.studies.cubesense.lens_fits import lens_fits
+from cubestack.host.studies.cubesense.thresholds import thresholds
 from cubestack.host.studies.fidelity.table import Fidelity, read_tables
 from cubestack.host.studies.rows.estimate import deviation, rate_of
 from cubestack.host.studies.rows.trial import Figures, Trial, measured
@@ -235,8 +238,12 @@ FIDELITY = Fidelity(
         "nadir-time": Trial(partial(_times, sensor="nadir"), 90, 6, 15),
         "sun-time": Trial(partial(_times, sensor="sun", sun_angle=5), 90, 6, 10),
         "sun-still": Trial(partial(_scatter, sensor="sun", angles_deg=(0.0, 40.0, 80.0)), 60, 6, 8),
+        "partial": Trial(benches.partial_earth, 5, 2, 8),
+        "scatter": Trial(benches.scatter, 8, 2, 18),
         "power": Trial(_power, profiles=False),
         "lens": Trial(_lens, profiles=False),
+        "threshold": Trial(thresholds, 6, 2, 12),
+        "lens-fits": Trial(lens_fits),
         "light": Trial(_light, profiles=False),
         "tiles": Trial(_tiles, command="hdl area"),
         "memory": Trial(_memory, profiles=False),

@@ -25,12 +25,14 @@ from cubestack.host.studies.cubestar.layouts import LayoutOptions, attitudes_of_
 from cubestack.host.studies.cubestar.night import night
 from cubestack.host.studies.cubestar.readings import READINGS, night_by, signs
 from cubestack.host.studies.cubestar.shots import PICTURES, Shot, field_shots, slewing_shots
+from cubestack.host.studies.cubestar.variants import VARIANTS
 from cubestack.host.studies.fidelity.table import Fidelity, read_tables
 from cubestack.host.studies.rows.estimate import average, rate, rate_of, resampled
 from cubestack.host.studies.rows.trial import Figures, Trial, measured
 
 RATES = (0.0635, 0.1333, 0.3, 2.0, 8.0)
 """Of section 6.2, in deg/s."""
+AS_PRINTED = "equation=printed,estimate=votes"
 CRYSTAL_HZ = 10_000_000
 REGISTERS = (30, 9, 8, 7, 6)
 """Settings of table D.2."""
@@ -54,7 +56,7 @@ def _field(opened: CubeStarOpener, frames: int, **how: Any) -> Figures:
 
 def _slew(opened: CubeStarOpener, frames: int, rate_deg_s: float) -> Figures:
     """Rates in percent of images 1 s apart, and the median error in degrees."""
-    shots = list(slewing_shots(opened, frames, rate_deg_s))
+    shots = [shot for shot, _ in slewing_shots(opened, frames, rate_deg_s)]
     skies = [shots[at : at + PICTURES] for at in range(0, len(shots), PICTURES)]
     return {
         "right": rate(shot.right for shot in shots),
@@ -299,6 +301,9 @@ FIDELITY = Fidelity(
         "night": Trial(night, 30, 1, 20),
         **{f"reading-{name}": Trial(partial(night_by, reading=name), 8, 1, 8) for name in READINGS},
         "signs": Trial(signs, profiles=False),
+        "noiseless-as-printed": _measured(100, mag_limit=3.8, no_noise=True, set=AS_PRINTED),
+        "full-as-printed": _measured(60, mag_limit=4.5, set=AS_PRINTED),
+        **VARIANTS,
         "loop": Trial(_loop, 20, 2, 10),
         **{
             f"layout-{layout.value}": Trial(partial(_layout, layout=layout.value), 30, 2, 5)

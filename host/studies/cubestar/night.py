@@ -137,7 +137,7 @@ def choose_threshold(client: CubeStar) -> int:
     client.capture()
     best, most = LADDER[-1], -MOST_CENTROIDS
     for threshold in reversed(LADDER):
-        _set_threshold(client, threshold)
+        set_threshold(client, threshold)
         client.process_image()
         centroids = int(client.client.telemetry("DetectionSummary")["NumStarsDetected"])
         if centroids > MOST_CENTROIDS:
@@ -146,10 +146,11 @@ def choose_threshold(client: CubeStar) -> int:
         matched = attitude.matched if attitude.valid else 0
         if 2 * matched - centroids > most:
             best, most = threshold, 2 * matched - centroids
-    _set_threshold(client, best)
+    set_threshold(client, best)
     return best
 
 
-def _set_threshold(client: CubeStar, threshold: int) -> None:
+def set_threshold(client: CubeStar, threshold: int) -> None:
+    """Set both thresholds of the detection, in DN."""
     both = {"DetectionThreshold": threshold, "StarThreshold": threshold}
     client.configure({"setDetectionThresholds": both})

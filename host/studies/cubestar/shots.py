@@ -42,8 +42,14 @@ class Shot:
 
 def _shot(device: measure.CubeStarEmulated, *, judged: bool = False) -> Shot:
     """Capture one; ``judged`` counts stars without an attitude too, and wrong ones."""
+    return processed(device, device.client.capture_and_process(), judged=judged)
+
+
+def processed(
+    device: measure.CubeStarEmulated, status: TaskStatus, *, judged: bool = False
+) -> Shot:
+    """Of the image that was processed last, up to a step."""
     cubestar, client = device.client, device.client.client
-    status = cubestar.capture_and_process()
     attitude, truth = cubestar.attitude(), device.board.truth()
     assert truth is not None  # a sky has one
     detected = int(client.telemetry("DetectionSummary")["NumStarsDetected"])
@@ -96,8 +102,11 @@ def field_shots(
             yield _shot(device, judged=True)
 
 
-def slewing_shots(opened: measure.CubeStarOpener, frames: int, rate_deg_s: float) -> Iterator[Shot]:
-    """While turning across the boresight: section 6.2, on a mount that does not shake."""
+def slewing_shots(
+    opened: measure.CubeStarOpener, frames: int, rate_deg_s: float
+) -> Iterator[tuple[Shot, measure.CubeStarEmulated]]:
+    """While turning across the boresight: section 6.2, on a mount that does not shake; each with
+    the device, for the caller to read more of it."""
     rng = np.random.default_rng(SEED)
     with opened(None, seed=SEED) as device:
         for number in range(frames):
@@ -111,5 +120,5 @@ def slewing_shots(opened: measure.CubeStarOpener, frames: int, rate_deg_s: float
             mode = IdMode.LOST_IN_SPACE if first else IdMode.TRACKING
             device.client.client.command("setIDMode", IdMode=mode)
             due_s = device.time_s + 1
-            yield _shot(device)
+            yield _shot(device), device
             device.client.client.pause(max(0.0, due_s - device.time_s))

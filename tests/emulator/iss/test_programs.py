@@ -8,7 +8,7 @@ import pytest
 
 from cubestack.emulator.iss.outcome import Outgoing, OutgoingKind
 from tests.emulator.iss.cross_compiler import binary_of, compile_for_m3, needs_compiler
-from tests.tiers import quick
+from tests.tiers import quick_ones
 
 from .efm32gg.bench import MS, US, Bench
 
@@ -42,22 +42,18 @@ class Console(Bench):
 Start = Callable[[str], Console]
 
 
-@pytest.fixture(scope="module")
-def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Folder with all programs, each compiled for size and for speed."""
-    folder = tmp_path_factory.mktemp("programs")
-    for source in {*PROGRAMS.glob("*.c")} - {PROGRAMS / "startup.c"}:
-        for option in ("-O0", "-Os", "-O2"):
-            sources = PROGRAMS / "startup.c", source, "-T", PROGRAMS / "device.ld", "-lgcc"
-            target = folder / f"{source.stem}{option}.elf"
-            compile_for_m3(option, "-ffreestanding", "-nostdlib", *sources, "-o", target)
-    return folder
+@pytest.fixture(params=quick_ones(["-O0", "-Os", "-O2"], "-O2"))
+def start(request: pytest.FixtureRequest, tmp_path: Path) -> Start:
+    """Compiles a program by its name, and starts it."""
 
+    def call(name: str) -> Console:
+        sources = (PROGRAMS / file for file in ("startup.c", f"{name}.c"))
+        options = request.param, "-ffreestanding", "-nostdlib", "-T", PROGRAMS / "device.ld"
+        target = tmp_path / f"{name}.elf"
+        compile_for_m3(*options, *sources, "-lgcc", "-o", target)
+        return Console(image=binary_of(target))
 
-@pytest.fixture(params=quick(["-O0", "-Os", "-O2"], 2))
-def start(request: pytest.FixtureRequest, built: Path) -> Start:
-    """Starts a program by name."""
-    return lambda name: Console(image=binary_of(built / f"{name}{request.param}.elf"))
+    return call
 
 
 def test_characters_received_by_dma_in_ping_pong_are_echoed(start: Start) -> None:

@@ -69,6 +69,36 @@ def test_rotations_near_180_deg_lose_no_accuracy(off_deg: float, seed: int) -> N
     assert angle_deg(attitude_of(solve(body, body @ truth, np.ones(8))), truth) < 2e-3
 
 
+def printed(body: Matrix, inertial: Matrix, meter: Meter) -> NDArray[np.float32]:
+    given = (one.astype(np.float32) for one in (body, inertial, np.ones(len(body))))
+    return quest(*given, meter, rotated=False)
+
+
+def test_printed_equation_is_cheaper_and_right_far_from_180_deg() -> None:
+    rotated, plain = Meter(CORTEX_M3), Meter(CORTEX_M3)
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        turn = Rotation.from_rotvec(rng.uniform(-1, 1, 3)).as_matrix()
+        body = in_field(rng, 12)
+        assert angle_deg(attitude_of(printed(body, body @ turn, plain)), turn) < 2e-3
+        quest(*(one.astype(np.float32) for one in (body, body @ turn, np.ones(12))), rotated)
+    assert plain.total < 0.95 * rotated.total
+
+
+def test_printed_equation_fails_near_180_deg() -> None:
+    rng = np.random.default_rng(1)
+    body = in_field(rng, 8)
+    errors = []
+    for off_deg in (10.0, 1.0, 0.1):
+        turn = Rotation.from_rotvec(np.radians([0, 180 - off_deg, 0])).as_matrix()
+        errors.append(angle_deg(attitude_of(printed(body, body @ turn, Meter(CORTEX_M3))), turn))
+    assert max(errors[:2]) < 0.01
+    assert errors[2] > 10 * errors[0]
+    half = np.diag([-1.0, 1.0, -1.0])
+    with pytest.raises(AttitudeError, match="singular"):
+        printed(np.eye(3)[:2], np.eye(3)[:2] @ half, Meter(CORTEX_M3))
+
+
 @pytest.mark.parametrize("seed", range(20))
 def test_dcm_is_the_rotation_of_the_quaternion(seed: int) -> None:
     quaternion = Rotation.random(random_state=seed).as_quat().astype(np.float32)

@@ -21,6 +21,7 @@ from cubestack.firmware_model.cubesense.vision.distortion import Projection, Rad
 from cubestack.firmware_model.cubesense.vision.edges import EdgeConfig
 from cubestack.firmware_model.cubesense.vision.nadir import NadirConfig, find_nadir
 from cubestack.firmware_model.cubesense.vision.sun_centroid import SunConfig, find_sun
+from cubestack.firmware_model.interface.codec.switches import PROFILES
 from cubestack.firmware_model.interface.cubesense import INTERFACE
 from cubestack.firmware_model.interface.cubesense.codes import (
     EDGE_UNIT,
@@ -30,6 +31,7 @@ from cubestack.firmware_model.interface.cubesense.codes import (
     NadirSearch,
     Sram,
 )
+from cubestack.firmware_model.interface.cubesense.switches import CubeSenseSwitches
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.pic18 import PIC18F45K20
 from cubestack.firmware_model.mcu.requests import ReadTimer, Routine, SetPin, StrobeRead
@@ -107,6 +109,31 @@ def test_nadir_is_measured_from_either_memory(
     assert measured["Radius"] == pytest.approx(63.5 * 2.9, abs=0.5)
     assert (measured["FirstX"], measured["FirstY"], measured["PixelsRead"]) == (0, 0, 9920)
     assert edges_of(unit) == {(x / EDGE_UNIT, y / EDGE_UNIT) for x, y in edges.points}
+
+
+@pytest.mark.parametrize("sram", Sram)
+@pytest.mark.parametrize("profile", PROFILES)
+def test_dynamic_threshold_is_the_mean_of_all_pixels(profile: str, sram: Sram) -> None:
+    unit = Harness(CubeSenseSwitches.of(profile, "threshold=dynamic"))
+    picture = (34 + (earth(5, -20) - 34.0) / 4).astype(np.uint8)  # all below the fixed one
+    unit.scenes[Camera.NADIR] = picture
+    dynamic = measure(unit, Camera.NADIR, sram)
+    mean = int(picture.mean())
+    fixed = Harness(CubeSenseSwitches.of(profile))
+    fixed.scenes[Camera.NADIR] = picture
+    fixed.command("DetectionThreshold2", Threshold=mean)
+    expected = measure(fixed, Camera.NADIR, sram)
+    assert dynamic["Detect"] == DetectResult.SUCCESS
+    for name in ("X", "Y", "Radius", "Points"):
+        assert dynamic[name] == expected[name]
+
+
+def test_memory_cut_off_while_the_mean_is_taken_ends_the_measurement() -> None:
+    unit = Harness(CubeSenseSwitches.of("published", "threshold=dynamic"))
+    unit.scenes[Camera.NADIR] = earth(0, 0)
+    unit.latch_on(StrobeRead, Sram.SRAM2)
+    measured = measure(unit, Camera.NADIR)
+    assert outcome(measured) == (CaptureResult.SRAM_OVER_CURRENT, DetectResult.NONE_SCHEDULED)
 
 
 @pytest.mark.parametrize("profile", ["extended"])

@@ -189,6 +189,7 @@ def test_todays_run_of_a_minute(tmp_path: Path) -> None:
     todays_run(tmp_path)
 
 
+@pytest.mark.slow
 def test_shipped_pair_is_proved() -> None:
     chosen = {name: one for name, one in CONTRACT.properties.items() if name not in BOUNDED}
     assert all(verdict.proved for verdict in prove_contract(Design(CONTRACT), chosen))

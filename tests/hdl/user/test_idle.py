@@ -73,6 +73,7 @@ def test_storing_is_not_idle() -> None:
     assert verdict.moves
 
 
+@pytest.mark.slow
 def test_strides_are_those_of_the_shipped_design_whose_proof_holds() -> None:
     shipped = CubeStarTop(COLUMNS, ROWS)
     assert proved_strides(shipped, shipped) == [*shipped.strides]

@@ -9,6 +9,7 @@ import pytest
 
 from cubestack.emulator.camera.common.view import SkyView
 from cubestack.emulator.camera.mlx75412.lens import CONDITION
+from cubestack.emulator.camera.mlx75412.remap import Remap
 from cubestack.emulator.camera.mlx75412.sensor import Mlx75412, exposure_lines, frame_lines
 from cubestack.emulator.scene.sky import PictureScene, SkyScene
 from cubestack.firmware_model.interface.cameras import mlx75412 as chip
@@ -292,10 +293,30 @@ def test_published_setup_logs_only_unmodelled_registers(caplog: pytest.LogCaptur
         assert not caplog.records
         write(camera, "LINEARITY", 0)
         write(camera, "HARDWARE_FEATURES", 0x4E)
+        write(camera, "FIRMWARE_FEATURES", 0xA0)
     messages = caplog.messages
     assert messages == ["MLX75412: wrote LINEARITY, which is not modelled"] * 21 + [
-        "MLX75412: set HISTOGRAM_REMAP of HARDWARE_FEATURES, which is not modelled"
+        "MLX75412: set AUTO_EXPOSURE of FIRMWARE_FEATURES, which is not modelled"
     ]
+
+
+@pytest.mark.parametrize(
+    ("hardware", "firmware", "is_on"), [(0x40, 0x80, True), (0x40, 0, False), (0, 0x80, False)]
+)
+def test_remap_needs_the_histogram_and_autoview(hardware: int, firmware: int, is_on: bool) -> None:
+    def pixels(remap: Remap) -> np.ndarray:
+        camera = Mlx75412(SkyScene.pointing(80.0, 0.0))
+        camera.remap = remap
+        configure(camera)
+        write(camera, "HARDWARE_FEATURES", hardware)
+        write(camera, "FIRMWARE_FEATURES", firmware)
+        write(camera, "SYNC", chip.SYNC_APPLY)
+        enable(camera, 0)
+        return np.asarray(segments(camera, 0, 3)[2].pixels())
+
+    plain, found = pixels(Remap.UPPER_BITS), pixels(Remap.EQUALIZED)
+    assert (np.median(found) > 50) == is_on
+    assert np.array_equal(plain, found) == (not is_on)
 
 
 def test_view_sets_the_condition_and_scene_keeps_it() -> None:

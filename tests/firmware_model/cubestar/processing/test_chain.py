@@ -70,7 +70,8 @@ def test_quest_weights_follow_the_confirmation(
 ) -> None:
     given: list[np.ndarray] = []
 
-    def weigh(*arguments: np.ndarray) -> np.ndarray:
+    def weigh(*arguments: np.ndarray, rotated: bool) -> np.ndarray:
+        assert rotated
         given.extend(arguments[:3])
         return np.array([0, 0, 0, 1], np.float32)
 

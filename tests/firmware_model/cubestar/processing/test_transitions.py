@@ -174,3 +174,26 @@ def test_candidate_and_quality_survive_a_reset(unsure: Harness, pose: Rotation, 
     assert after is not None
     assert after.pack() == candidate.pack()
     assert unsure.telemetry("Quality") == quality
+
+
+@pytest.mark.parametrize("profile", ["published", "extended"])
+def test_last_attitude_serves_as_hint_where_following_is_assisted(
+    catalogue: StarCatalogue, pose: Rotation, profile: str
+) -> None:
+    """A turn by 1 deg, beyond the reach of tracking."""
+    found = {}
+    for following in ("tracking", "assisted"):
+        unit = Harness(catalogue, CubeStarSwitches.of(profile, f"following={following}"))
+        unit.command("setIDMode", IdMode=IdMode.TRACKING)
+        for degrees in (0.0, 0.5):
+            unit.run(until_us=unit.now_us + 1_000_000)
+            unit.picture = take(catalogue, turned(pose, degrees)).picture
+            unit.command("CaptureAndProcess")
+        found[following] = (
+            unit.program.commands.processing.results.mode,
+            unit.telemetry("AttitudeQuaternion")["Valid"],
+        )
+    assert found["tracking"][0] is TRACKING
+    assert found["assisted"] == (ASSISTED, 1)
+    if profile == "published":
+        assert not found["tracking"][1]

@@ -1,5 +1,7 @@
 import errno
 import json
+import tracemalloc
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +31,20 @@ def test_rows_are_read_as_written_and_sorted(folder: Folder) -> None:
     assert list(Folder(folder.path).rows()) == rows(1) + rows(0)
     folder.sort()
     assert list(folder.rows()) == rows(0) + rows(1)
+
+
+def test_sorting_keeps_one_block_in_memory(folder: Folder) -> None:
+    blocks, many = [*range(1, 60, 2), *range(0, 60, 2)], {str(n): n / 3 for n in range(200)}
+    for block in blocks:
+        folder.add(replace(row, result=many) for row in rows(block))
+    before = (folder.path / ROWS).stat().st_size
+    tracemalloc.start()
+    folder.sort()
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert [row.key for row in folder.rows()] == [(n, row) for n in range(60) for row in range(3)]
+    assert (folder.path / ROWS).stat().st_size == before
+    assert peak < before / 4
 
 
 @pytest.mark.parametrize("cut", range(1, 200, 13))

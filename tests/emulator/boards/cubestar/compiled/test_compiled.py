@@ -1,6 +1,7 @@
 """The reference algorithms as compiled code on the simulated part: same bits, and their cycles."""
 
 import shutil
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ from cubestack.emulator.boards.cubestar.compiled.machine import (
 )
 from cubestack.emulator.boards.monitor import peek
 from cubestack.emulator.iss.calls import CallError, Calls
+from cubestack.emulator.iss.image import Image
 from cubestack.emulator.iss.insight.symbols import Symbols
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3, load_measurements
 from cubestack.firmware_model.mcu.costs import Meter
@@ -35,6 +37,12 @@ from .....firmware_model.cubestar.sky import take
 needs_compiler = pytest.mark.skipif(shutil.which(COMPILER) is None, reason=f"no {COMPILER}")
 
 
+@cache
+def image(level: str) -> Image:
+    """The program, compiled once for each level."""
+    return compile_program(Build(level), generated())
+
+
 @pytest.fixture(scope="module")
 def shot() -> NDArray[np.uint8]:
     pose = Rotation.from_euler("zxz", [40, 65, -110], degrees=True)
@@ -43,13 +51,13 @@ def shot() -> NDArray[np.uint8]:
 
 @pytest.fixture(scope="module")
 def fast() -> Calls:
-    return start_program(compile_program(Build("O2"), generated()), Timing())
+    return start_program(image("O2"), Timing())
 
 
 @needs_compiler
 @pytest.mark.parametrize("level", ["O0", "O2", "Os"])
 def test_compiled_attitude_is_identical_to_the_bit(level: str, shot: NDArray[np.uint8]) -> None:
-    calls = start_program(compile_program(Build(level), generated()), Timing())
+    calls = start_program(image(level), Timing())
     expected = picture.run_model(shot, onboard_catalogue(), Meter(CORTEX_M3))
     found = picture.run(calls, shot)
     assert (found.stars, found.quaternion) == (expected.stars, expected.quaternion)
@@ -78,9 +86,8 @@ def test_operation_costs_match_the_record(fast: Calls) -> None:
 
 @needs_compiler
 def test_waits_of_the_memories_cost_cycles(shot: NDArray[np.uint8]) -> None:
-    image = compile_program(Build("O2"), generated())
     cycles = [
-        sum(picture.run(start_program(image, timing), shot).cycles.values())
+        sum(picture.run(start_program(image("O2"), timing), shot).cycles.values())
         for timing in (
             Timing(flash_waits=0),
             Timing(),
@@ -102,7 +109,7 @@ def test_reports_faulting_and_unknown_calls(fast: Calls) -> None:
 
 @needs_compiler
 def test_fault_does_not_consume_stack_of_later_calls() -> None:
-    calls = start_program(compile_program(Build("O2"), generated()), Timing())
+    calls = start_program(image("O2"), Timing())
     calls.call("read_words", 1, 0)
     before = calls.machine.register("sp")
     with pytest.raises(CallError):
@@ -156,7 +163,7 @@ def test_python_charges_match_the_compiled_program_per_phase(fast: Calls, seed: 
 )
 def test_timing_is_read_from_the_processor_registers(timing: Timing, mode: int) -> None:
     """By the fields' names: MSC, EBI and CMU of the EFM32GG Reference Manual."""
-    machine = start_program(compile_program(Build("O2"), generated()), timing).machine
+    machine = start_program(image("O2"), timing).machine
 
     def fields(what: str) -> dict[str, int]:
         (found,) = peek(machine, Symbols(None), what)
