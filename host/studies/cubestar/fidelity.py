@@ -21,6 +21,7 @@ from cubestack.host.experiments.attitude import AttitudeResult
 from cubestack.host.experiments.cubestar.measure import CubeStarOpener
 from cubestack.host.studies.calibrate import CalibrateOptions
 from cubestack.host.studies.cubestar.calibrate import EXPERIMENT
+from cubestack.host.studies.cubestar.celestial import celestial
 from cubestack.host.studies.cubestar.layouts import LayoutOptions, attitudes_of_loop, measure_layout
 from cubestack.host.studies.cubestar.night import night
 from cubestack.host.studies.cubestar.readings import READINGS, night_by, signs
@@ -301,6 +302,7 @@ FIDELITY = Fidelity(
         "night": Trial(night, 30, 1, 20),
         **{f"reading-{name}": Trial(partial(night_by, reading=name), 8, 1, 8) for name in READINGS},
         "signs": Trial(signs, profiles=False),
+        "celestial": Trial(celestial, 20, 1, 12),
         "noiseless-as-printed": _measured(100, mag_limit=3.8, no_noise=True, set=AS_PRINTED),
         "full-as-printed": _measured(60, mag_limit=4.5, set=AS_PRINTED),
         **VARIANTS,

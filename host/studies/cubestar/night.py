@@ -101,19 +101,26 @@ def fields(
         air = Atmosphere(LATITUDE_DEG, sidereal_deg, HEIGHT_M, SEEING_ARCSEC, sky_mag=SKY_MAG)
         sky = SkyScene.pointing(sidereal_deg, LATITUDE_DEG, float(roll_deg))
         sky = replace(sky, rate_deg_s=earth_rate_deg_s(sky.quaternion), atmosphere=air)
-        with opened(SkyView(sky, replace(CONDITION, optics=optics)), seed=0) as emulated:
-            if settings:
-                emulated.client.configure(settings)
-            choose_threshold(emulated.client)
-            emulated.client.client.command("Trigger")
-            lines = log_lines(
-                emulated.client,
-                partial(getattr, emulated, "time_s"),
-                count=max(frames, 3) + SETTLING,
-                interval_s=INTERVAL_S if whole else 1.0,
-            )
-            good = [line for line in list(lines)[SETTLING:] if line.get("valid")]
-        yield _field(good, max(frames, 3))
+        view = SkyView(sky, replace(CONDITION, optics=optics))
+        yield _field(logged(opened, view, frames, settings or {}), max(frames, 3))
+
+
+def logged(
+    opened: CubeStarOpener, view: SkyView, frames: int, settings: Mapping[str, Mapping[str, Any]]
+) -> list[Columns]:
+    """Lines with an attitude of the 1 Hz loop's log, at least three asked for."""
+    with opened(view, seed=0) as emulated:
+        if settings:
+            emulated.client.configure(settings)
+        choose_threshold(emulated.client)
+        emulated.client.client.command("Trigger")
+        lines = log_lines(
+            emulated.client,
+            partial(getattr, emulated, "time_s"),
+            count=max(frames, 3) + SETTLING,
+            interval_s=INTERVAL_S if frames > SETTLING else 1.0,
+        )
+        return [line for line in list(lines)[SETTLING:] if line.get("valid")]
 
 
 def _field(good: Sequence[Columns], count: int) -> Field:
