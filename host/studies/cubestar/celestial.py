@@ -24,6 +24,7 @@ from cubestack.host.studies.cubestar.night import (
     HEIGHT_M,
     LATITUDE_DEG,
     LEAST_VALID,
+    MOST_SCATTER_DEG,
     QUICK_FIELD,
     SEEING_ARCSEC,
     SETTLING,
@@ -39,15 +40,17 @@ ANGLES = ("ra", "dec", "roll")
 
 
 def celestial(opened: CubeStarOpener, frames: int) -> Figures:
-    """Drift in deg/h and scatter in deg of each angle, in the mean over the fields with an
-    attitude of at least half of the images; ``turning`` of the
-    scene about the boresight in deg/h; ``fields``."""
+    """Drift in deg/h and scatter in deg of each angle, in the mean over the fields where the test
+    can take place, as for a fixed camera; ``turning`` of the scene about the boresight in deg/h;
+    number of ``fields``."""
     whole, found = frames > SETTLING, list[Sequence[float]]()
     for sidereal_deg in SIDEREAL_DEG if whole else [SIDEREAL_DEG[QUICK_FIELD]]:
         scene = followed(sidereal_deg)
         good = logged(opened, SkyView(scene, CONDITION), frames, {})
-        if 100 * len(good) / max(frames, 3) >= LEAST_VALID:
-            found.append([*_drifts(good), -3600 * np.asarray(scene.rate_deg_s)[2]])
+        angles = _drifts(good)
+        enough = 100 * len(good) / max(frames, 3) >= LEAST_VALID
+        if enough and max(angles[len(ANGLES) :]) <= MOST_SCATTER_DEG:
+            found.append([*angles, -3600 * np.asarray(scene.rate_deg_s)[2]])
     names = [*(f"{one}_drift" for one in ANGLES), *ANGLES, "turning"]
     columns = np.array(found).T if found else np.full((len(names), 1), np.nan)
     means = {name: average(map(float, each)) for name, each in zip(names, columns, strict=True)}

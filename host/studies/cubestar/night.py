@@ -108,7 +108,7 @@ def fields(
 def logged(
     opened: CubeStarOpener, view: SkyView, frames: int, settings: Mapping[str, Mapping[str, Any]]
 ) -> list[Columns]:
-    """Lines with an attitude of the 1 Hz loop's log, at least three asked for."""
+    """Lines with an attitude of the 1 Hz loop's log, of at least three lines."""
     with opened(view, seed=0) as emulated:
         if settings:
             emulated.client.configure(settings)

@@ -41,11 +41,11 @@ def measurement(call: str, seconds: float, figures: Figures, entries: Iterable[s
 
 
 def load(path: Path) -> dict[str, Measurement]:
-    """Measurements of a file by key; none if it is not there."""
+    """Measurements of a file by key; none if it is not there or holds something else."""
     if not path.is_file():
         return {}
     stored = json.loads(path.read_text("utf-8"))
-    entries = stored["depends"]
+    entries = stored.get("depends", [])
     return {
         key: Measurement(
             one["call"],
@@ -53,7 +53,7 @@ def load(path: Path) -> dict[str, Measurement]:
             {name: _value(value) for name, value in one["figures"].items()},
             tuple(entries[at] for at in _numbers(one["depends"])),
         )
-        for key, one in stored["measurements"].items()
+        for key, one in stored.get("measurements", {}).items()
     }
 
 

@@ -58,5 +58,11 @@ def test_measurements_of_other_versions_of_a_file_keep_theirs(
     assert (back["old"].changed, back["new"].changed) == (["a.py"], [])
 
 
+def test_file_of_another_kind_has_no_measurements(tmp_path: Path) -> None:
+    path = tmp_path / "ratios.json"
+    path.write_text('{"0.2.0": {"ratio": 2.1}}', "utf-8")
+    assert load(path) == {}
+
+
 def test_file_that_is_not_there_has_no_measurements(tmp_path: Path) -> None:
     assert load(tmp_path / "none.json") == dict[str, Measurement]()
