@@ -6,6 +6,7 @@ ours, so it depends little on the machine and on its load.
 
 import time
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -79,7 +80,7 @@ def device_ratios(name: str) -> dict[str, float]:
 
 
 def _read(emulated: AnyEmulated) -> None:
-    client = emulated.client.client
+    client: Any = emulated.client.client
     for message in client.interface.telemetries:
         if not message.starts_measurement:
             client.request(bytes([message.id]))

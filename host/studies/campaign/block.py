@@ -4,6 +4,7 @@ A failed frame is a row with its error, and the next one starts with a new seed;
 measured again from its seed and its position after it.
 """
 
+import gc
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, is_dataclass
 from typing import Any
@@ -68,6 +69,7 @@ def perform(block: FrameBlock) -> list[Row]:
         results = measured(block, block.frames - frame, seed)
         rows += _measured(block, results, len(rows), seed, a_frame)
         frame = len(rows) // a_frame
+    gc.collect()  # a device is a cycle of few objects, with megabytes of arrays
     return rows
 
 

@@ -1,3 +1,4 @@
+import gc
 import signal
 import subprocess
 import sys
@@ -8,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cubestack.emulator.sim.virtual_time import Kernel
 from cubestack.host.studies.campaign import block as blocks
 from cubestack.host.studies.campaign import folder as running
 from cubestack.host.studies.campaign.block import perform, rows_of
@@ -33,6 +35,18 @@ def alone(small: Path, tmp_path_factory: pytest.TempPathFactory) -> Folder:
     rows = list(run(folder, 1))
     assert len(rows) == count(folder.plan) == 4
     return folder
+
+
+def devices() -> int:
+    """Number of kernels, each of a device that is in memory."""
+    return sum(type(one) is Kernel for one in gc.get_objects())
+
+
+def test_block_leaves_no_device_in_memory(alone: Folder) -> None:
+    gc.collect()
+    before = devices()
+    perform(next(iter(alone.plan.blocks())))
+    assert devices() == before
 
 
 def content(folder: Path) -> bytes:
