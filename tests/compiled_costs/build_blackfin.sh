@@ -34,7 +34,10 @@ usual="--target=bfin-elf --prefix=$folder --disable-nls --disable-werror --disab
 build() { # name, options, goals
     mkdir -p "$1.build"
     (cd "$1.build" && [ -f Makefile ] || ../"$1"/configure $usual $2 >configure.out 2>&1)
-    for goal in $3; do make -C "$1.build" -j"${JOBS:-1}" "$goal" >>"$1.build/make.out" 2>&1; done
+    for goal in $3; do
+        make -C "$1.build" -j"${JOBS:-$(nproc)}" "$goal" >>"$1.build/make.out" 2>&1 ||
+            { tail -n 20 "$1.build/make.out"; exit 1; }
+    done
 }
 build binutils "--disable-gdb --disable-sim --disable-gprofng --disable-ld-plugin" \
     "all-binutils all-gas all-ld install-binutils install-gas install-ld"

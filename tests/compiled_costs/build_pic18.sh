@@ -19,5 +19,5 @@ ports="mcs51 z80 z180 r2k r2ka r3ka sm83 tlcs90 ez80_z80 z80n ds390 ds400 pic14 
     pdk13 pdk14 pdk15 mos6502"
 ./configure --enable-pic16-port --disable-non-free --disable-ucsim --disable-device-lib \
     --disable-packihx --disable-sdcdb $(for port in $ports; do echo "--disable-$port-port"; done)
-make -j"${JOBS:-1}"
+make -j"${JOBS:-$(nproc)}"
 ls bin/sdcc
