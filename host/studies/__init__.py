@@ -13,6 +13,11 @@ COMMANDS = {
         ("demo", "demo", "run the devices end to end, with pictures (`make run`)"),
         ("fidelity", "fidelity.command", "measure every published figure, in both profiles"),
         ("hazards", "hazards.command", "count right, refused and wrong results in hard skies"),
+        (
+            "compare",
+            "compare.command",
+            "compare the algorithms that the theses weigh, on the same skies",
+        ),
         ("campaign", "campaign.command", "measure thousands of skies, resumable, on all cores"),
         ("powerfail", "powerfail.command", "cut the power at every flash write; check what boots"),
         ("calibrate", "calibrate", "fit a camera's lens to pictures of stars or lights"),

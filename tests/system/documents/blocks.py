@@ -32,7 +32,7 @@ LEFT = {
 }
 
 #: Commands that take minutes to hours.
-LONG = r"^campaign (?!--list)|^upsets|^fidelity|^costs|^hdl|^bench|^layouts"
+LONG = r"^campaign (?!--list)|^upsets|^fidelity|^costs|^hdl|^bench|^layouts|^compare"
 
 
 class Code(NamedTuple):

@@ -1,0 +1,1 @@
+"""`cubestack compare`: the algorithms that the theses weigh, on the same skies."""
