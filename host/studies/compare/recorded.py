@@ -82,7 +82,7 @@ def stored_rows(docs: Path, study: str) -> dict[str, tuple[Tracker, Rows]]:
 def rows_of(device: str, stored: Mapping[str, float]) -> list[Row]:
     by_row: dict[tuple[str, str], dict[str, float]] = {}
     for name, value in stored.items():
-        method, case, figure = name.split(", ")
+        method, case, figure = name.rsplit(", ", 2)  # a method's name may have a comma
         by_row.setdefault((method, case), {})[figure] = value
     return [Row(device, *names, values) for names, values in by_row.items()]
 

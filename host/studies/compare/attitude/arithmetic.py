@@ -94,13 +94,15 @@ def orthogonal_columns(a: Matrix, meter: Meter) -> tuple[Matrix, Matrix]:
     """a V with orthogonal columns, largest first, and the rotation V: one-sided Jacobi rotations
     (Hestenes), which keep small singular values exact."""
     left, right = a.copy(), np.eye(a.shape[1], dtype=a.dtype)
+    rounding = np.finfo(a.dtype).eps
+    nothing = rounding**2 * (a * a).sum()
     for _ in range(MOST_SWEEPS):
         turned = False
         for p, q in combinations(range(a.shape[1]), 2):
             one, other = left[:, p], left[:, q]
             dot, first, second = one @ other, one @ one, other @ other
             meter.charge(f32_mul=11, f32_add=6, f32_sqrt=1, f32_compare=1, ram_read=6)
-            if abs(dot) <= np.finfo(a.dtype).eps * np.sqrt(first * second):
+            if abs(dot) <= max(rounding * np.sqrt(first * second), nothing):
                 continue
             turned = True
             turn = _rotation(second - first, 2 * dot, meter)

@@ -95,6 +95,24 @@ def orthogonal_dcm(measured: Matrix, listed: Matrix, meter: Meter) -> Matrix | N
     return a
 
 
+def printed_quest(measured: Matrix, listed: Matrix, meter: Meter) -> Matrix | None:
+    """CubeStar thesis, equations 4.4.9 and 4.4.10 as printed, with an eigenvalue of 1: near half
+    turns the Rodrigues vector grows without bound."""
+    b = profile(measured, listed, meter)
+    one = b.dtype.type(1)
+    trace = b[0, 0] + b[1, 1] + b[2, 2]
+    inverted = inverse((one + trace) * np.eye(3, dtype=b.dtype) - b - b.T, meter)
+    meter.charge(f32_add=2 + 1 + 9 + 3 + 3, ram_read=9, ram_write=12)
+    if inverted is None:
+        return None
+    right = np.array([b[1, 2] - b[2, 1], b[2, 0] - b[0, 2], b[0, 1] - b[1, 0]])
+    p = product(inverted, right[:, None], meter)[:, 0]
+    scale = one / np.sqrt(one + p @ p)
+    meter.charge(f32_mul=6, f32_add=3, f32_sqrt=1, f32_div=1)
+    x, y, z, w = np.append(p * scale, scale)
+    return _matrix(-x, -y, -z, w, meter)
+
+
 def _quest(eigenvalue: Eigenvalue | None) -> Solve:
     def solve(measured: Matrix, listed: Matrix, meter: Meter) -> Matrix | None:
         weights = np.ones(len(measured), np.float32)
@@ -126,11 +144,13 @@ class Method:
     solve: Solve
 
 
+PRINTED = "QUEST as printed"
 QUEST_1 = Method("QUEST, eigenvalue 1", "S 4.4.1, A 6.2", _quest(None))
 
 METHODS = (
     Method("TRIAD", "S 4.4.1", triad),
     Method("q-method", "S 4.4.1, A 6.2", q_method),
+    Method(PRINTED, "S 4.4.1", printed_quest),
     QUEST_1,
     Method("QUEST, quartic", "A 6.2", _quest(largest_eigenvalue)),
     Method("SVD", "S 4.4.1", svd),

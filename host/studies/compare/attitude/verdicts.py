@@ -3,13 +3,13 @@
 from collections.abc import Callable
 from math import hypot
 
-from cubestack.host.studies.compare.attitude.methods import METHODS, QUEST_1
+from cubestack.host.studies.compare.attitude.methods import METHODS, PRINTED, QUEST_1
 from cubestack.host.studies.compare.attitude.run import SMOOTHING
 from cubestack.host.studies.compare.attitude.trials import CASES
 from cubestack.host.studies.compare.study import Rows, Verdict
 from cubestack.host.studies.compare.tracker import Tracker
 
-USUAL = CASES[0].name
+USUAL, TURNED = CASES[0].name, CASES[-1].name
 QUEST = QUEST_1.name
 SAME = 1.01  #: factor within which errors are the same
 
@@ -46,6 +46,11 @@ VERDICTS = (
         "QUEST takes less than 10 ms",
         "S 5.3.5",
         lambda rows, _: max(rows(QUEST, case.name, "longest_ms") for case in CASES) < 10,
+    ),
+    Verdict(
+        "QUEST is robust (as printed, no attitude refused or off after a half turn)",
+        "S 4.4.1",
+        lambda rows, _: not any(rows(PRINTED, TURNED, figure) for figure in ("refused", "far")),
     ),
     Verdict(
         "an eigenvalue of 1 is as precise as the root of the quartic",

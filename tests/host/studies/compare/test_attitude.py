@@ -17,7 +17,7 @@ Vectors = NDArray[np.float64]
 
 SOLVERS = {method.name: method.solve for method in methods.METHODS}
 OPTIMAL = ("q-method", "QUEST, eigenvalue 1", "QUEST, quartic", "SVD")
-IN_DOUBLE = ("TRIAD", "q-method", "SVD", "plain DCM", "orthogonal DCM")
+IN_DOUBLE = ("TRIAD", "q-method", "QUEST as printed", "SVD", "plain DCM", "orthogonal DCM")
 
 
 def _meter() -> Meter:
@@ -129,6 +129,15 @@ def test_half_turns_are_solved(name: str) -> None:
         listed = listed @ (attitude.T @ turn).T
         found = SOLVERS[name](measured.astype(np.float32), listed.astype(np.float32), _meter())
         assert found == pytest.approx(attitude, abs=1e-5)
+
+
+def test_quest_as_printed_fails_at_half_turns() -> None:
+    rng = np.random.default_rng(5)
+    measured, listed, turn = _stars(rng, 5, 0.3, 1e-5)
+    listed = listed @ (np.diag([-1.0, 1, -1]) @ turn).T
+    given = measured.astype(np.float32), listed.astype(np.float32)
+    found = SOLVERS[methods.PRINTED](*given, _meter())
+    assert found is None or np.abs(found - np.diag([-1, 1, -1])).max() > 0.01
 
 
 @pytest.mark.parametrize("name", SOLVERS)
