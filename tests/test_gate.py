@@ -45,6 +45,7 @@ OWN = {
     "host/native/wheels.py": "what it has built",
     "host/output.py": "files that it writes; it reads none",
     "host/studies/copies.py": "a copy of this process, through a pipe",
+    "host/studies/compare/page.py": "our documents",
     "host/studies/costs.py": "our documents",
     "host/studies/cubestar/demo.py": "our package",
     "host/studies/fidelity/command.py": "our documents",

@@ -11,7 +11,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.cubestar.catalogue import PairList, StarCatalogue
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.host.studies.compare.quadtree import pairs
 from cubestack.host.studies.compare.tracker import Floats, Indices, Tracker
@@ -87,20 +86,6 @@ class Catalogue:
             alike = np.full(len(second), first)
             found.append(np.stack([alike, others[second], others[third]], axis=1))
         return np.concatenate(found)
-
-    @cached_property
-    def voting(self) -> StarCatalogue:
-        """The same pairs for the firmware's geometric voting."""
-        listed = self.pairs
-        first, second = listed.first.astype(np.uint16), listed.second.astype(np.uint16)
-        return StarCatalogue(
-            self.tracker.stars,
-            PairList(first, second, listed.angle),
-            np.arange(len(self.vectors)),
-            self.tracker.v_mag,
-            self.tracker.faintest_mag,
-            float(np.degrees(self.tracker.pair_limit_rad)),
-        )
 
 
 def angles(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,8 +1,9 @@
 """A star tracker as the comparison sees it: what it sees, what it stores, and its processor.
 
 A device offers one as function ``tracker`` of module ``compare`` in its package of studies, which
-is its study "campaign". Methods work on directions of stars, so no image is rendered; the camera's
-lens, field and noise decide which stars there are and where.
+is its study "campaign"; module ``alternatives`` there has methods of its own program. Methods work
+on directions of stars, so no image is rendered; the camera's lens, field and noise decide which
+stars there are and where.
 """
 
 from collections.abc import Callable, Mapping
@@ -11,6 +12,7 @@ from functools import cached_property
 from importlib import import_module
 from importlib.util import find_spec
 from math import atan, pi
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +26,7 @@ Floats = NDArray[np.float32]
 Indices = NDArray[np.intp]
 
 PACKAGE = "campaign"  #: study of a device that is its package of studies
-MODULE = "compare"
+TRACKER, ALTERNATIVES = "compare", "alternatives"  #: modules in it
 NONE = -1  #: mark of a star without identity
 
 
@@ -87,17 +89,27 @@ class Tracker:
         return len(self.stars) * self.view.solid_angle_sr / (4 * pi)
 
 
-def trackers() -> dict[str, str]:
-    """Modules of the trackers of all registered devices that have one, by the device's name."""
+def _modules(name: str) -> dict[str, str]:
+    """Modules of this name in the packages of studies, by device."""
     packages = {one.name: one.study(PACKAGE) for one in devices() if PACKAGE in one.studies}
-    found = {name: f"{package}.{MODULE}" for name, package in packages.items()}
-    return {name: module for name, module in found.items() if find_spec(module)}
+    found = {device: f"{package}.{name}" for device, package in packages.items()}
+    return {device: module for device, module in found.items() if find_spec(module)}
+
+
+def trackers() -> list[str]:
+    """Names of the registered devices that have one."""
+    return list(_modules(TRACKER))
 
 
 def tracker(name: str) -> Tracker:
     """A device's tracker; raises ValueError if it has none."""
-    known = trackers()
+    known = _modules(TRACKER)
     if name not in known:
         raise ValueError(f"{name} has no star tracker to compare; there are {', '.join(known)}")
     loaded: Tracker = import_module(known[name]).tracker()
     return loaded
+
+
+def alternatives() -> list[Any]:
+    """Modules with methods of the devices' programs: tuples IDENTIFICATION and ATTITUDE."""
+    return [import_module(module) for module in _modules(ALTERNATIVES).values()]

@@ -4,12 +4,11 @@ Each method returns the direction cosine matrix (3, 3), inertial to camera, or N
 devices' own. All weigh all stars alike.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from cubestack.firmware_model.aramis.matching.identification import largest_eigenvalue
 from cubestack.firmware_model.attitude.quest import AttitudeError, Eigenvalue, dcm, quest
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.host.studies.compare.attitude.arithmetic import (
@@ -22,6 +21,7 @@ from cubestack.host.studies.compare.attitude.arithmetic import (
     profile,
     unit,
 )
+from cubestack.host.studies.compare.tracker import alternatives
 
 Solve = Callable[[Matrix, Matrix, Meter], Matrix | None]
 """Of measured and listed directions (n, 3)."""
@@ -113,7 +113,9 @@ def printed_quest(measured: Matrix, listed: Matrix, meter: Meter) -> Matrix | No
     return _matrix(-x, -y, -z, w, meter)
 
 
-def _quest(eigenvalue: Eigenvalue | None) -> Solve:
+def quest_with(eigenvalue: Eigenvalue | None) -> Solve:
+    """The devices' QUEST with an eigenvalue that is found so; None: with 1."""
+
     def solve(measured: Matrix, listed: Matrix, meter: Meter) -> Matrix | None:
         weights = np.ones(len(measured), np.float32)
         try:
@@ -145,15 +147,21 @@ class Method:
 
 
 PRINTED = "QUEST as printed"
-QUEST_1 = Method("QUEST, eigenvalue 1", "S 4.4.1, A 6.2", _quest(None))
+QUEST_1 = Method("QUEST, eigenvalue 1", "S 4.4.1, A 6.2", quest_with(None))
 
-METHODS = (
+_FIRST = (
     Method("TRIAD", "S 4.4.1", triad),
     Method("q-method", "S 4.4.1, A 6.2", q_method),
     Method(PRINTED, "S 4.4.1", printed_quest),
     QUEST_1,
-    Method("QUEST, quartic", "A 6.2", _quest(largest_eigenvalue)),
+)
+_LAST = (
     Method("SVD", "S 4.4.1", svd),
     Method("plain DCM", "A 6.1.1", plain_dcm),
     Method("orthogonal DCM", "A 6.1.1", orthogonal_dcm),
 )
+
+
+def methods() -> Sequence[Method]:
+    """All in the order of the tables, with those of the devices' own programs."""
+    return (*_FIRST, *(one for offered in alternatives() for one in offered.ATTITUDE), *_LAST)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.host.studies.compare.attitude.arithmetic import Matrix
-from cubestack.host.studies.compare.attitude.methods import METHODS, Solve
+from cubestack.host.studies.compare.attitude.methods import Solve, methods
 from cubestack.host.studies.compare.attitude.smoothing import smooth
 from cubestack.host.studies.compare.attitude.trials import CASES, STEP_S, Trial, take_trial
 from cubestack.host.studies.compare.study import Row
@@ -24,7 +24,7 @@ Estimate = Callable[[Trial, Meter], Matrix | None]
 
 def estimates() -> dict[str, Estimate]:
     """All methods by name; the filter takes all images, the others the last."""
-    found = {method.name: _of_last(method.solve) for method in METHODS}
+    found = {method.name: _of_last(method.solve) for method in methods()}
     return found | {
         SMOOTHING: lambda trial, meter: smooth(
             trial.frames, trial.listed, trial.sigma_rad, STEP_S, meter

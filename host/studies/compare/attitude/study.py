@@ -2,14 +2,14 @@
 
 from math import isnan
 
-from cubestack.host.studies.compare.attitude.methods import METHODS
+from cubestack.host.studies.compare.attitude.methods import methods
 from cubestack.host.studies.compare.attitude.run import SMOOTHING
 from cubestack.host.studies.compare.attitude.trials import CASES
 from cubestack.host.studies.compare.attitude.verdicts import USUAL, VERDICTS
 from cubestack.host.studies.compare.plots import errors_and_times
 from cubestack.host.studies.compare.study import Cell, Rows, Study, Table, number
 
-NAMES = {method.name: method.source for method in METHODS} | {SMOOTHING: "A 6.2"}
+NAMES = {method.name: method.source for method in methods()} | {SMOOTHING: "A 6.2"}
 
 
 def _errors(case: str) -> Cell:

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from math import hypot
 
-from cubestack.host.studies.compare.attitude.methods import METHODS, PRINTED, QUEST_1
+from cubestack.host.studies.compare.attitude.methods import PRINTED, QUEST_1, methods
 from cubestack.host.studies.compare.attitude.run import SMOOTHING
 from cubestack.host.studies.compare.attitude.trials import CASES
 from cubestack.host.studies.compare.study import Rows, Verdict
@@ -66,7 +66,7 @@ VERDICTS = (
         "a Kalman filter smooths the output (smaller errors than all others)",
         "A 6.2",
         lambda rows, _: (
-            _error(rows, SMOOTHING) < min(_error(rows, method.name) for method in METHODS)
+            _error(rows, SMOOTHING) < min(_error(rows, method.name) for method in methods())
         ),
     ),
 )

@@ -10,7 +10,7 @@ import numpy as np
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.host.experiments.rates import Outcome
 from cubestack.host.studies.compare.database import Catalogue
-from cubestack.host.studies.compare.identification.methods import METHODS, Identifier, Method
+from cubestack.host.studies.compare.identification.methods import Identifier, methods
 from cubestack.host.studies.compare.skies import CASES, Case, take_image
 from cubestack.host.studies.compare.study import Row
 from cubestack.host.studies.compare.tracker import NONE, Image, Indices, Tracker
@@ -33,10 +33,10 @@ def judge(names: Indices, image: Image, tracker: Tracker, noise: float) -> Outco
     return "right" if len(named) >= FEWEST else "refused"
 
 
-def build(tracker: Tracker, methods: Sequence[Method] = METHODS) -> dict[str, Identifier]:
+def build(tracker: Tracker) -> dict[str, Identifier]:
     """The methods with their databases, by name."""
     catalogue = Catalogue(tracker)
-    return {method.name: method.build(catalogue) for method in methods}
+    return {method.name: method.build(catalogue) for method in methods()}
 
 
 def compare(

@@ -1,6 +1,6 @@
 """The comparison of identifications as the command and the page show it."""
 
-from cubestack.host.studies.compare.identification.methods import METHODS
+from cubestack.host.studies.compare.identification.methods import methods
 from cubestack.host.studies.compare.identification.verdicts import HARDEST, USUAL, VERDICTS
 from cubestack.host.studies.compare.plots import rates_and_costs
 from cubestack.host.studies.compare.skies import CASES
@@ -12,6 +12,8 @@ OUTCOMES = ("right", "refused", "wrong")
 def _outcomes(case: str) -> Cell:
     return lambda rows, method: " / ".join(f"{rows(method, case, one):.0f}" for one in OUTCOMES)
 
+
+METHODS = methods()
 
 STUDY = Study(
     name="identification",

@@ -15,7 +15,7 @@ from cubestack.host.studies.compare.tracker import Tracker
 
 Vectors = NDArray[np.float64]
 
-SOLVERS = {method.name: method.solve for method in methods.METHODS}
+SOLVERS = {method.name: method.solve for method in methods.methods()}
 OPTIMAL = ("q-method", "QUEST, eigenvalue 1", "QUEST, quartic", "SVD")
 IN_DOUBLE = ("TRIAD", "q-method", "QUEST as printed", "SVD", "plain DCM", "orthogonal DCM")
 
