@@ -130,7 +130,7 @@ def test_too_few_stars_yield_no_attitude(unit: Harness, pose: Rotation) -> None:
 def test_failed_attitude_estimation_sets_status_and_flag(
     unit: Harness, monkeypatch: pytest.MonkeyPatch, sky: Sky
 ) -> None:
-    def refuse(*_arguments: object) -> None:
+    def refuse(*_arguments: object, **_how: object) -> None:
         raise AttitudeError("the vectors all point the same way")
 
     monkeypatch.setattr("cubestack.firmware_model.cubestar.processing.estimate.quest", refuse)
