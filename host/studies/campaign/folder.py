@@ -16,6 +16,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
+from cubestack.firmware_model.formats import untrusted
 from cubestack.firmware_model.formats.untrusted import parse_json, read_json, read_lines
 from cubestack.firmware_model.versions import CAMPAIGN
 from cubestack.host.emulation.emulated import AnyEmulated
@@ -157,8 +158,8 @@ class Folder:
 
 def _texts(path: Path, spans: Iterable[tuple[object, int, int]]) -> Iterator[str]:
     """The text from each place of a file to another one."""
-    for _, begin, end in spans:
-        with path.open("rb") as file:
+    with untrusted.opened(path, LARGEST_ROWS, FolderError) as file:
+        for _, begin, end in spans:
             file.seek(begin)
             yield file.read(end - begin).decode()
 
