@@ -42,14 +42,14 @@ def test_tracked_share_excludes_the_first_frame_of_a_sky(monkeypatch: pytest.Mon
     one = [shot(10, 8), *[shot(10, 10, tracked=True, cross_deg=0.03)] * 6, *[shot(10, 7)] * 3]
     two = [shot(0, 0, valid=False, right=False, cross_deg=np.nan)] * 2
     two += [shot(6, 6, right=False, cross_deg=0.5)]
-    monkeypatch.setattr(cubestar, "slewing_shots", lambda *_: one + two)
+    monkeypatch.setattr(cubestar, "slewing_shots", lambda *_: [(s, None) for s in one + two])
     found = cubestar._slew(None, 13, 0.3)  # type: ignore[arg-type]
     assert found["right"] == pytest.approx(100 * 10 / 13)
     assert found["tracked"] == pytest.approx(100 * 6 / 11)
     assert found["off"] == pytest.approx(100 / 13)
     assert found["share"] == pytest.approx(100 * (8 + 60 + 21 + 6) / 106)
     assert found["cross"] == 0.03
-    monkeypatch.setattr(cubestar, "slewing_shots", lambda *_: two[:2])
+    monkeypatch.setattr(cubestar, "slewing_shots", lambda *_: [(s, None) for s in two[:2]])
     found = cubestar._slew(None, 2, 8.0)  # type: ignore[arg-type]
     assert found["share"] == 0
     assert np.isnan(found["cross"])
