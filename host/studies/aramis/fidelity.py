@@ -20,13 +20,15 @@ from cubestack.firmware_model.aramis.matching.triples import (
 )
 from cubestack.firmware_model.aramis.solution import Profile
 from cubestack.firmware_model.interface.aramis import IMAGE_BYTES
-from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
+from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533, LIBRARIES
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.host.experiments.aramis.measure import AramisOpener, AramisResult
+from cubestack.host.experiments.measure import measure
 from cubestack.host.studies.aramis.printed import bounds, spikes
 from cubestack.host.studies.fidelity.table import Fidelity, read_tables
+from cubestack.host.studies.hazards.overview import skies
 from cubestack.host.studies.rows.estimate import average, rate
-from cubestack.host.studies.rows.trial import Figures, Trial, measured
+from cubestack.host.studies.rows.trial import Figures, Trial, measured, measured_in_turn
 
 EPOCH = 2000.0  # of the thesis' catalogue
 LOOKUP_SEED = 1
@@ -124,6 +126,79 @@ def _in_ram(protection: str) -> Trial:
     return _switched(_checks, 60, 2, 5, ram_flips=1e-8, set=f"ram={protection}")
 
 
+def _moving(results: Sequence[AramisResult]) -> Figures:
+    """Percentages, and the largest errors of the right ones in degrees."""
+    right = [result for result in results if result.right]
+    smeared = [result.reason == "smear" for result in results]
+    return {
+        "right": rate(r.right for r in results),
+        "smear": rate(smeared),
+        "other": rate(not r.right and not smear for r, smear in zip(results, smeared, strict=True)),
+        "cross_worst": max((r.error_cross_deg or 0.0 for r in right), default=np.nan),
+        "roll_worst": max((abs(r.error_roll_deg or 0.0) for r in right), default=np.nan),
+    }
+
+
+def _upset(results: Sequence[AramisResult]) -> Figures:
+    """Flipped bits, what loading corrected and lost, and the percentage of right results."""
+    counts = {
+        name: sum(getattr(r, name) for r in results) for name in ("flips", "corrected", "lost")
+    }
+    return {**counts, "right": rate(r.right for r in results)}
+
+
+#: Steps of a measurement by the figure that they belong to.
+STEPS = {
+    "capture": ("capture",),
+    "check": ("check",),
+    "threshold": ("threshold",),
+    "spikes": ("spikes",),
+    "centroids": ("centroids",),
+    "search": ("faces", "triangles", "search", "pivoting", "identities"),
+    "attitude": ("attitude",),
+    "verification": ("verification",),
+}
+
+
+def _times(opened: AramisOpener, frames: int) -> Figures:
+    """Mean times in ms with each library's costs."""
+    figures: dict[str, float] = {}
+    for library in LIBRARIES:
+        board = {**opened.board, "set": f"library={library}"}
+        results = list(measure("aramis", frames=frames, seed=1, **board))
+        for name, steps in STEPS.items():
+            times = [sum(result.phase_ms[step] for step in steps) for result in results]  # type: ignore[attr-defined]
+            figures[f"{library}_{name}"] = float(np.mean(times))
+        processing = [one for name, one in figures.items() if name.startswith(library)][1:]
+        figures[f"{library}_processing"] = sum(processing)
+    return figures
+
+
+#: For figures in the text of pages.
+_TEXT = {
+    "moving": measured_in_turn(
+        "aramis",
+        _moving,
+        {"roll": {"roll_rate": 10}, "turn": {"rate": 2}},
+        60,
+        extremes=("cross_worst", "roll_worst"),
+        profile="extended",
+    ),
+    "flips": measured(
+        "aramis",
+        _upset,
+        100,
+        extremes=("flips", "corrected", "lost"),
+        profile="extended",
+        bit_flips=1e-6,
+    ),
+    "times": Trial(_times, 40, 2, 4),
+    "skies": skies(
+        "aramis",
+        {"false5": {"false_stars": 5}, "false20": {"false_stars": 20, "false_mags": (0.0, 4.0)}},
+    ),
+}
+
 FIDELITY = Fidelity(
     page="fidelity-aramis.md",
     trials={
@@ -135,6 +210,7 @@ FIDELITY = Fidelity(
         "bounds": Trial(bounds, 300, 20, 5, profiles=False),
         "scores": _switched(_attitudes, 100, 3, 10, set="scores=variance"),
         **{f"ram-{one}": _in_ram(one) for one in ("checksum", "redundant", "coded")},
+        **_TEXT,
     },
     tables=read_tables("cubestack.host.studies.aramis"),
 )

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from functools import partial
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -20,13 +21,15 @@ from cubestack.hdl.cubesense.tops import AREA_FILE
 from cubestack.hdl.flow.area_report import recorded_areas
 from cubestack.host.experiments.cubesense.measure import CubeSenseOpener, SensorResult, view_of
 from cubestack.host.experiments.measure import measure
-from cubestack.host.studies.cubesense import benches
+from cubestack.host.experiments.opener import Opener
+from cubestack.host.studies.cubesense import benches, calibrate, upsets
 from cubestack.host.studies.cubesense.ball import EXPERIMENT, BallOptions
 from cubestack.host.studies.cubesense.lens_fits import lens_fits
 from cubestack.host.studies.cubesense.thresholds import thresholds
 from cubestack.host.studies.fidelity.table import Fidelity, read_tables
-from cubestack.host.studies.rows.estimate import deviation, rate_of
-from cubestack.host.studies.rows.trial import Figures, Trial, measured
+from cubestack.host.studies.rows.estimate import average, deviation, rate_of
+from cubestack.host.studies.rows.trial import Figures, Trial, measured, measured_in_turn
+from cubestack.host.studies.upsets.figures import upset_figures
 
 ALTITUDE_KM = 750.0  # of the text
 SUN_BANDS = {
@@ -78,6 +81,13 @@ def _sensor(results: Sequence[SensorResult]) -> Figures:
     detected = figures["detected"]
     return {name: float(value) for name, value in figures.items()} | {"detected": detected}
 
+
+#: Switches that improve the nadir sensor, one by one.
+SINGLE = {
+    "sub-pixel": "edges=sub-pixel",
+    "equidistant": "distortion=equidistant",
+    "stereographic": "distortion=stereographic",
+}
 
 #: Readings of the processor's speed, by the prefix of their figures.
 SPEEDS = {
@@ -225,9 +235,91 @@ def _memory(_opened: CubeSenseOpener, _frames: int) -> Figures:
     }
 
 
+def _search(results: Sequence[SensorResult]) -> Figures:
+    """Pixels that the processor read, times in ms, and the 95th percentile of the error in deg."""
+    errors = [one.error_deg for one in results if one.error_deg is not None]
+    return {
+        "pixels": average(one.pixels_read for one in results),
+        "search_ms": average(one.phase_ms["search"] for one in results),
+        "total_ms": average(one.phase_ms["total"] for one in results),
+        "mean": average(errors),
+        "p95": float(np.percentile(errors, 95)),
+        "found": rate_of(len(errors), len(results)),
+    }
+
+
+def _read_out(opened: CubeSenseOpener, frames: int) -> Figures:
+    """Mean times in ms to read the Sun's window and to scan the Earth's image, by gateware, sensor
+    and memory; without the scan that is longer than the processor's timer."""
+    figures: dict[str, float] = {}
+    for gateware in upsets.VARIANTS:
+        board = {**opened.board, "set": f"gateware={gateware}"}
+        for sensor, memory in product(("sun", "nadir"), ("own", "other")):
+            if (gateware, sensor, memory) == ("one-search", "nadir", "other"):
+                continue
+            where = {"sensor": sensor, "memory": memory}
+            results = measure("cubesense", frames=frames, seed=2, **where, **board)
+            times = [one.phase_ms["search"] for one in results]  # type: ignore[attr-defined]
+            figures[f"{gateware} {sensor} {memory}"] = float(np.mean(times))
+    return figures
+
+
+def _calibrated(opened: CubeSenseOpener, frames: int) -> Figures:
+    """Mean errors in deg before and after a calibration, by unit and sensor."""
+    with_lens = Opener(opened.device, board={**opened.board, "set": "lens=residuals"})
+    figures: dict[str, float] = {}
+    for unit in (0, 1):
+        how = calibrate.CalibrateOptions(seed=unit, emulated=frames, check_poses=frames // 2)
+        for one in calibrate.EXPERIMENT.run(with_lens, how):
+            figures[f"{unit} {one.sensor} before"] = one.error_before_deg or np.nan
+            figures[f"{unit} {one.sensor} after"] = one.error_after_deg or np.nan
+    return figures
+
+
 _measured = partial(
     measured, "cubesense", _sensor, seed=2, units=10, extremes=("worst", "least", "most")
 )
+
+_in_turn = partial(measured_in_turn, "cubesense", seed=2)
+_NADIR = {"sensor": "nadir"}
+
+#: For figures in the text of pages.
+_TEXT: dict[str, Trial] = {
+    "nominal": _in_turn(
+        _sensor,
+        {sensor: {"sensor": sensor, "set": "lens=nominal"} for sensor in ("nadir", "sun")}
+        | {name: {**_NADIR, "set": f"lens=nominal,{switch}"} for name, switch in SINGLE.items()},
+        100,
+        10,
+        25,
+        units=10,
+        extremes=("worst", "least", "most"),
+        profile="published",
+    ),
+    "altitudes": _in_turn(
+        _sensor,
+        {f"{altitude}": {**_NADIR, "altitude": altitude} for altitude in (400, 750, 1500)},
+        50,
+        extremes=("worst", "least", "most"),
+        profile="extended",
+    ),
+    "search": _in_turn(
+        _search,
+        {name: {**_NADIR, "search": name} for name in ("lines", "samples", "stepping")},
+        60,
+        profile="extended",
+    ),
+    "other": _in_turn(
+        _search,
+        {sensor: {"sensor": sensor, "memory": "other"} for sensor in ("nadir", "sun")}
+        | {"bloom": {"sensor": "sun", "bloom": 8}},
+        50,
+        profile="extended",
+    ),
+    "upsets": Trial(partial(upset_figures, experiment=upsets.EXPERIMENT), 1, 0, 90, profiles=False),
+    "read-out": Trial(_read_out, 2, 1, 5, profile="published"),
+    "calibrated": Trial(_calibrated, 60, 8, 24),
+}
 
 FIDELITY = Fidelity(
     page="fidelity-cubesense.md",
@@ -247,6 +339,7 @@ FIDELITY = Fidelity(
         "light": Trial(_light, profiles=False),
         "tiles": Trial(_tiles, command="hdl area"),
         "memory": Trial(_memory, profiles=False),
+        **_TEXT,
     },
     tables=read_tables("cubestack.host.studies.cubesense"),
 )

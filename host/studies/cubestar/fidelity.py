@@ -19,17 +19,22 @@ from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, PIXEL_P
 from cubestack.firmware_model.interface.cubestar.pins import Layout
 from cubestack.host.experiments.attitude import AttitudeResult
 from cubestack.host.experiments.cubestar.measure import CubeStarOpener
+from cubestack.host.experiments.hazard_options import Asked
 from cubestack.host.studies.calibrate import CalibrateOptions
+from cubestack.host.studies.cubestar import upsets
 from cubestack.host.studies.cubestar.calibrate import EXPERIMENT
 from cubestack.host.studies.cubestar.celestial import celestial
 from cubestack.host.studies.cubestar.layouts import LayoutOptions, attitudes_of_loop, measure_layout
+from cubestack.host.studies.cubestar.margins import margins
 from cubestack.host.studies.cubestar.night import night
 from cubestack.host.studies.cubestar.readings import READINGS, night_by, signs
 from cubestack.host.studies.cubestar.shots import PICTURES, Shot, field_shots, slewing_shots
 from cubestack.host.studies.cubestar.variants import VARIANTS
 from cubestack.host.studies.fidelity.table import Fidelity, read_tables
+from cubestack.host.studies.hazards.overview import skies
 from cubestack.host.studies.rows.estimate import average, rate, rate_of, resampled
-from cubestack.host.studies.rows.trial import Figures, Trial, measured
+from cubestack.host.studies.rows.trial import Figures, Trial, measured, measured_in_turn
+from cubestack.host.studies.upsets.figures import upset_figures
 
 RATES = (0.0635, 0.1333, 0.3, 2.0, 8.0)
 """Of section 6.2, in deg/s."""
@@ -288,6 +293,34 @@ _measured = partial(
     extremes=("cross_worst", "roll_worst", "algorithms", "match", "quest"),
 )
 
+_ASSISTED = {"mode": "assisted", "hint_error": 5}
+_FALSE = {f"false{count}": {"mag_limit": 3.8, "false_stars": count} for count in (5, 20)}
+_FOCAL = {
+    f"focal-length={percent}": {"hazard": (Asked("focal-length", percent),)}
+    for percent in (0.5, 1, 3)
+}
+
+#: For figures in the text of pages.
+_TEXT = {
+    "limits": measured_in_turn(
+        "cubestar",
+        _attitudes,
+        {
+            "bright": {"mag_limit": 3.8},
+            "bright, assisted": {"mag_limit": 3.8, **_ASSISTED},
+            "all": {},
+            "all, assisted": {"threshold": 16, **_ASSISTED},
+            "threshold 6": {"threshold": 6},
+            "threshold 6, assisted": {"threshold": 6, **_ASSISTED},
+        },
+        100,
+        seconds=30,
+    ),
+    "margins": Trial(margins, 200, 5, 20, profiles=False),
+    "upsets": Trial(partial(upset_figures, experiment=upsets.EXPERIMENT), 8, 0, 90, profiles=False),
+    "skies": skies("cubestar", {"bright": {"mag_limit": 3.8}, **_FALSE, **_FOCAL}),
+}
+
 FIDELITY = Fidelity(
     page="fidelity.md",
     trials={
@@ -318,6 +351,7 @@ FIDELITY = Fidelity(
         "spots": Trial(_spots, 20, 1, 3),
         "rates": Trial(_rates, seconds=2, profiles=False),
         "optics": Trial(_optics, profiles=False),
+        **_TEXT,
     },
     tables=read_tables("cubestack.host.studies.cubestar"),
     elsewhere={"memory layouts": "layouts.md"},

@@ -32,7 +32,9 @@ Stored = Mapping[str, Mapping[str, Measurement]]
 
 
 def stored_in(docs: Path) -> Stored:
-    return {path.stem: load(path) for path in sorted((docs / FOLDER).glob("*.json"))}
+    """Measurements of the files that pages name."""
+    files = {file for page in pages_with_figures(docs) for file, _, _ in names_in(page)}
+    return {file: load(docs / FOLDER / f"{file}.json") for file in sorted(files)}
 
 
 def pages_with_figures(docs: Path) -> list[Path]:

@@ -76,6 +76,35 @@ def measured(
     return Trial(run, frames, quick, seconds, " ".join(words), profile=profile)
 
 
+def measured_in_turn(
+    device: str,
+    summary: Callable[[Sequence[Any]], Figures],
+    runs: Mapping[str, Mapping[str, Any]],
+    frames: int,
+    quick: int = 2,
+    seconds: float = 10.0,
+    seed: int = 1,
+    units: int = 1,
+    extremes: tuple[str, ...] = (),
+    profile: str = "",
+) -> Trial:
+    """A trial of several runs of `cubestack measure`, by name, with the options of each; the names
+    of their figures begin with the run's and a blank. Other arguments as in ``measured``."""
+    how = {"device": device, "summary": summary, "seed": seed, "units": units}
+    run = partial(_in_turn, **how, extremes=extremes, runs=runs)  # type: ignore[arg-type]
+    return Trial(run, frames, quick, seconds, profile=profile)
+
+
+def _in_turn(
+    opened: Opener[Any, Any], frames: int, *, runs: Mapping[str, Mapping[str, Any]], **how: Any
+) -> Figures:
+    figures: dict[str, float] = {}
+    for name, options in runs.items():
+        found = _measured(opened, frames, options=options, **how)
+        figures |= {f"{name} {key}": value for key, value in found.items()}
+    return figures
+
+
 def _measured(
     opened: Opener[Any, Any],
     frames: int,
