@@ -125,7 +125,7 @@ FIGURES ?=
 
 fidelity: .venv/ready-dev
 	@OPENBLAS_NUM_THREADS=1 $(BIN)/cubestack fidelity $(FIGURES) --write
-	@OPENBLAS_NUM_THREADS=1 $(BIN)/cubestack hazards $(FIGURES) --frames 12 --seed 1 --out docs
+	@OPENBLAS_NUM_THREADS=1 $(BIN)/cubestack hazards $(FIGURES) --frames 8 --seed 1 --out docs
 	@$(BIN)/cubestack compare identification $(FIGURES) --out docs
 	@$(BIN)/cubestack compare attitude $(FIGURES) --out docs
 

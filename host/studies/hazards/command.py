@@ -6,8 +6,8 @@ Results do not depend on the number of workers.
 
 examples:
   cubestack hazards {first} --hazard moon --frames 20
-  cubestack hazards --frames 12 --seed 1 --out docs       all, and the page that shows them
-  cubestack hazards --frames 12 --seed 1 --stale          name the curves whose code changed
+  cubestack hazards --frames 8 --seed 1 --out docs       all, and the page that shows them
+  cubestack hazards --frames 8 --seed 1 --stale          name the curves whose code changed
   cubestack hazards {first} --json > points.jsonl
   cubestack hazards --list                                list hazards and their strengths
 """

@@ -92,7 +92,7 @@ def test_page_numbers_match_the_points() -> None:
         assert row in page
 
 
-FRAMES, SEED = 12, 1
+FRAMES, SEED = 8, 1
 """Of the curves of the page."""
 
 
