@@ -136,16 +136,14 @@ def test_stale_curves_are_named(tmp_path: Path, run: Run, monkeypatch: pytest.Mo
 
 
 @pytest.mark.slow
-def test_todays_stored_curve_is_the_same() -> None:
-    stored = sorted(load(recorded.record_file(DOCS)).items())
-    for name, one in stored[datetime.now(UTC).toordinal() % max(len(stored), 1) :][:1]:
+def test_todays_stored_curves_are_the_same() -> None:
+    """An eighth of them."""
+    stored = load(recorded.record_file(DOCS))
+    for name in sorted(stored)[datetime.now(UTC).toordinal() % 8 :: 8]:
         device, hazard = name.split()
-        frames, seed = (
-            int(re.findall(rf"--{word} (\d+)", one.call)[0]) for word in ("frames", "seed")
-        )
-        jobs = list(jobs_of(device, [hazard], frames, seed, "extended"))
-        assert recorded.call(tuple(jobs)) == one.call
-        assert recorded.figures(list(run_jobs(jobs, 1))) == one.figures
+        jobs = list(jobs_of(device, [hazard], FRAMES, SEED, "extended"))
+        assert recorded.call(tuple(jobs)) == stored[name].call
+        assert recorded.figures(list(run_jobs(jobs, 1))) == stored[name].figures
 
 
 @pytest.mark.slow
