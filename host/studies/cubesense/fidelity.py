@@ -258,7 +258,7 @@ def _read_out(opened: CubeSenseOpener, frames: int) -> Figures:
             if (gateware, sensor, memory) == ("one-search", "nadir", "other"):
                 continue
             where = {"sensor": sensor, "memory": memory}
-            results = measure("cubesense", frames=frames, seed=2, **where, **board)
+            results = measure("cubesense", frames=frames, seed=2, **where, **board)  # type: ignore[arg-type]
             times = [one.phase_ms["search"] for one in results]  # type: ignore[attr-defined]
             figures[f"{gateware} {sensor} {memory}"] = float(np.mean(times))
     return figures

@@ -90,8 +90,8 @@ def run(args: argparse.Namespace) -> int:
         jobs = [job for job in jobs if job in reasons]
         for job in jobs:
             keys = ", ".join(row.key for row in recorded.rows_of(job))
-            rows = f" rows {keys}:" if keys else ""
-            tell(f"{job.device}, {job.key}:{rows} {reasons[job]}")
+            of_rows = f" rows {keys}:" if keys else ""
+            tell(f"{job.device}, {job.key}:{of_rows} {reasons[job]}")
         if not args.write:
             return 1 if jobs else 0
     if args.write:

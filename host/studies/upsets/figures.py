@@ -23,7 +23,7 @@ def upset_figures(opened: Any, frames: int, *, experiment: UpsetExperiment) -> F
     results = list[UpsetResult]()
     for seed in range(max(frames, 1)):
         some = {} if frames else {"registers": FEW}
-        results += experiment.run(opened, experiment.options(frames=1, seed=seed, **some))
+        results += experiment.run(opened, experiment.options(frames=1, seed=seed, **some))  # type: ignore[arg-type]
     figures: dict[str, float] = {}
     parts = atlas(results)
     for part in parts:
@@ -34,7 +34,7 @@ def upset_figures(opened: Any, frames: int, *, experiment: UpsetExperiment) -> F
         figures |= {f"{part.name} {one}": rate_of(part.answers[one], count) for one in BAD}
     answers = Counter(one.answer for one in results)
     effects = Counter(one.effect for one in results)
-    figures |= {f"all {one}": rate_of(answers[one], len(results)) for one in BAD}
+    figures |= {f"all {one}": rate_of(answers[one], len(results)) for one in BAD}  # type: ignore[index]
     figures |= {f"all {effect}": effects[effect] for effect in EFFECTS}
     figures["all a day"] = sum(part.a_day for part in parts)
     figures["all upsets"] = len(results)
