@@ -221,7 +221,7 @@ def test_commands_and_files_of_the_fidelity_pages_exist(
     name: str, device: str, measured: int, others: int
 ) -> None:
     page = text_of(f"docs/{name}.md")
-    commands = re.findall(r"`measure (--[^`]+)`", page)
+    commands = re.findall(rf"`measure (?:{device} )?(--[^`]+)`", page)
     assert len(commands) >= measured
     for command in commands:
         make_parser().parse_args(["measure", device, "--json", *command.split()])
