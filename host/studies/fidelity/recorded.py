@@ -19,8 +19,8 @@ from cubestack.host.studies.fidelity.table import (
     shown,
 )
 from cubestack.host.studies.fidelity.text import FOLDER
-from cubestack.host.studies.rows.record import Measurement, load, measurement, save
-from cubestack.host.studies.rows.trace import Trace
+from cubestack.host.studies.rows.record import load, measurement, save
+from cubestack.host.studies.rows.trace import Noted, Trace
 from cubestack.host.studies.rows.trial import Figures
 from cubestack.host.studies.workers import performed_afresh
 
@@ -39,8 +39,11 @@ def rows_of(job: Job) -> list[Row]:
     return [row for row in fidelity_of(job.device).rows if row.trial == job.trial]
 
 
-def measured_anew(job: Job) -> Measurement:
-    """Run a job in this process, which must be a new one: first a few frames, to see what runs."""
+def measured_anew(job: Job) -> tuple[float, Figures, Noted]:
+    """Run a job in this process, which must be a new one: first a few frames, to see what runs.
+
+    Returns its processor time in s, its figures, and what ran.
+    """
     trial, trace = fidelity_of(job.device).trials[job.trial], Trace()
     started = _spent_s()
     with trace.running():
@@ -48,7 +51,7 @@ def measured_anew(job: Job) -> Measurement:
     if job.frames:
         started = _spent_s()
         figures = perform(job)
-    return measurement(trial.call, _spent_s() - started, figures, trace.entries())
+    return _spent_s() - started, figures, trace.noted()
 
 
 def _spent_s() -> float:
@@ -64,7 +67,9 @@ def renewed(
     What a device no longer declares leaves its file.
     """
     order = sorted(jobs, key=lambda job: -job.seconds)
-    for job, found in performed_afresh(measured_anew, order, workers):
+    for job, (seconds, figures, noted) in performed_afresh(measured_anew, order, workers):
+        call = fidelity_of(job.device).trials[job.trial].call
+        found = measurement(call, seconds, figures, noted.entries())
         path = record_file(docs, job.device)
         stored = load(path)
         if job.key in stored:

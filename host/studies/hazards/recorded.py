@@ -7,8 +7,8 @@ from pathlib import Path
 
 from cubestack.host.experiments.hazard_options import known
 from cubestack.host.studies.hazards.curves import Job, Point, perform
-from cubestack.host.studies.rows.record import Measurement, load, measurement, save
-from cubestack.host.studies.rows.trace import Trace
+from cubestack.host.studies.rows.record import load, measurement, save
+from cubestack.host.studies.rows.trace import Noted, Trace
 from cubestack.host.studies.workers import performed_afresh
 
 Curve = tuple[Job, ...]
@@ -24,15 +24,17 @@ def key(job: Job) -> str:
     return f"{job.device} {job.hazard}"
 
 
-def measured_anew(curve: Curve) -> tuple[list[Point], Measurement]:
-    """Measure a curve in this process, which must be a new one: first a frame, to see what runs."""
+def measured_anew(curve: Curve) -> tuple[float, list[Point], Noted]:
+    """Measure a curve in this process, which must be a new one: first a frame, to see what runs.
+
+    Returns its processor time in s, its points, and what ran.
+    """
     first, trace = curve[0], Trace()
     with trace.running():
         perform(replace(first, strength=known()[first.hazard].strength.usual, frames=1))
     started = time.process_time()
     points = [perform(job) for job in curve]
-    seconds = time.process_time() - started
-    return points, measurement(call(curve), seconds, figures(points), trace.entries())
+    return time.process_time() - started, points, trace.noted()
 
 
 def call(curve: Curve) -> str:
@@ -61,7 +63,8 @@ def curves_of(jobs: Iterable[Job]) -> list[Curve]:
 
 def renewed(docs: Path, curves: Sequence[Curve], workers: int) -> Iterator[Point]:
     """Measure the curves and store each as it ends."""
-    for curve, (points, found) in performed_afresh(measured_anew, curves, workers):
+    for curve, (seconds, points, noted) in performed_afresh(measured_anew, curves, workers):
+        found = measurement(call(curve), seconds, figures(points), noted.entries())
         path = record_file(docs)
         save(path, load(path) | {key(curve[0]): found})
         yield from points

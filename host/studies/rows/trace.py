@@ -5,6 +5,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from types import CodeType, FrameType
 from typing import Any
 
@@ -54,16 +55,28 @@ class Trace:
             sys.setprofile(None)
             threading.setprofile(None)
 
-    def entries(self) -> list[str]:
-        """Entries of what the measurement depends on; RuntimeError if a file has changed since."""
+    def noted(self) -> "Noted":
         ran = set[Name]()
         for code in self._codes:
             file = relative(code.co_filename)
             if file is not None and not file.startswith(_MACHINERY):
                 ran.add((file, code.co_qualname.partition(".<locals>")[0]))
-        found = entries(ran, _opened)
+        return Noted(frozenset(ran), frozenset(_opened), self._begun)
+
+
+@dataclass(frozen=True)
+class Noted:
+    """What ran and was read in a process; another one may look up what that depends on."""
+
+    ran: frozenset[Name]
+    files: frozenset[str]
+    begun: float  #: time of the start
+
+    def entries(self) -> list[str]:
+        """Entries of what the measurement depends on; RuntimeError if a file has changed since."""
+        found = entries(self.ran, self.files)
         for file in {one.partition(":")[0] for one in found}:
-            if (ROOT / file).stat().st_mtime > self._begun:
+            if (ROOT / file).stat().st_mtime > self.begun:
                 raise RuntimeError(f"{file} has changed while it was in use; measure again")
         return found
 
