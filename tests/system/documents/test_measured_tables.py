@@ -55,7 +55,7 @@ ELSEWHERE: dict[tuple[str, str], str] = {
     ("how-to/fpga-board.md", "for one image"): "counted in simulation of the board's gateware",
     ("how-to/fpga-board.md", "built with"): "of a placer that is not installed with the project",
     ("how-to/profiles.md", " | CubeStar"): DECLARED,
-    ("identification.md", "lens | CubeStar"): "thousands of skies of the search alone",
+    ("identification.md", " | lens"): "tests/host/studies/test_lens_errors.py compares",
     ("identification.md", " | ours"): "with another program, of one version",
     ("layouts.md", "phase | cycles"): DECLARED,
     ("mutants.md", "Top | Possible"): LONG,
