@@ -50,6 +50,11 @@ def test_records_have_no_other_measurements() -> None:
         assert load(record_file(DOCS, device)).keys() == {job.key for job in all_jobs(device)}
 
 
+@pytest.mark.parametrize("device", BUILT_IN)
+def test_calls_are_the_same_in_every_process(device: str) -> None:
+    assert not [one for one in fidelity_of(device).trials.values() if " at 0x" in one.call]
+
+
 def test_all_rows_together_take_at_most_twenty_minutes_on_two_cores() -> None:
     stored = [one for name in BUILT_IN for one in load(record_file(DOCS, name)).values()]
     assert sum(one.seconds for one in stored) < 2 * 20 * 60

@@ -27,9 +27,13 @@ class Experiment:
         ]
 
 
+def opened(experiment: Experiment) -> Any:
+    return SimpleNamespace(device=SimpleNamespace(study={"upsets": experiment}.get))
+
+
 def test_each_scene_has_each_bit_once() -> None:
-    experiment: Any = Experiment()
-    found = upset_figures(None, 4, experiment=experiment)
+    experiment = Experiment()
+    found = upset_figures(opened(experiment), 4)
     assert experiment.asked == [{"frames": 1, "seed": seed} for seed in range(4)]
     assert (found["writer.ack upsets"], found["writer.ack bits"]) == (4, 1)
     assert (found["writer.ack seen"], found["writer.ack wrong"]) == (50, 50)
@@ -40,6 +44,6 @@ def test_each_scene_has_each_bit_once() -> None:
 
 
 def test_without_scenes_a_few_registers_show_what_runs() -> None:
-    experiment: Any = Experiment()
-    upset_figures(None, 0, experiment=experiment)
+    experiment = Experiment()
+    upset_figures(opened(experiment), 0)
     assert experiment.asked == [{"frames": 1, "seed": 0, "registers": FEW}]
