@@ -3,6 +3,7 @@
 from collections import Counter
 from typing import Any
 
+from cubestack.host.experiments.measure import experiment_of
 from cubestack.host.studies.rows.estimate import rate_of
 from cubestack.host.studies.rows.trial import Figures
 from cubestack.host.studies.upsets.atlas import BAD, atlas
@@ -19,7 +20,7 @@ def upset_figures(opened: Any, frames: int) -> Figures:
     processor noticed, and of answers that were refused and wrong. Of all: these percentages, and
     the number of each effect.
     """
-    experiment = opened.device.study("upsets")
+    experiment = experiment_of(opened.device, "upsets")
     results = list[UpsetResult]()
     for seed in range(max(frames, 1)):
         some = {} if frames else {"registers": FEW}

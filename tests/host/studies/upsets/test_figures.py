@@ -1,6 +1,7 @@
 from types import SimpleNamespace
 from typing import Any
 
+from cubestack.host.devices.device import Report
 from cubestack.host.studies.upsets.figures import FEW, upset_figures
 from cubestack.host.studies.upsets.sample import UpsetResult
 
@@ -28,7 +29,8 @@ class Experiment:
 
 
 def opened(experiment: Experiment) -> Any:
-    return SimpleNamespace(device=SimpleNamespace(study={"upsets": experiment}.get))
+    report = Report("upsets", "flip bits", lambda: experiment)  # type: ignore[arg-type,return-value]
+    return SimpleNamespace(device=SimpleNamespace(name="walker", reports=(report,)))
 
 
 def test_each_scene_has_each_bit_once() -> None:
