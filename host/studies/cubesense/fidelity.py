@@ -316,7 +316,7 @@ _TEXT: dict[str, Trial] = {
         50,
         profile="extended",
     ),
-    "upsets": Trial(upset_figures, 1, 0, 90, profiles=False),
+    "upsets": Trial(partial(upset_figures, experiment=upsets.EXPERIMENT), 1, 0, 90, profiles=False),
     "read-out": Trial(_read_out, 2, 1, 5, profile="published"),
     "calibrated": Trial(_calibrated, 60, 8, 24),
 }

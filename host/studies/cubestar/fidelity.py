@@ -21,6 +21,7 @@ from cubestack.host.experiments.attitude import AttitudeResult
 from cubestack.host.experiments.cubestar.measure import CubeStarOpener
 from cubestack.host.experiments.hazard_options import Asked
 from cubestack.host.studies.calibrate import CalibrateOptions
+from cubestack.host.studies.cubestar import upsets
 from cubestack.host.studies.cubestar.calibrate import EXPERIMENT
 from cubestack.host.studies.cubestar.celestial import celestial
 from cubestack.host.studies.cubestar.layouts import LayoutOptions, attitudes_of_loop, measure_layout
@@ -316,7 +317,7 @@ _TEXT = {
         seconds=30,
     ),
     "margins": Trial(margins, 200, 5, 20, profiles=False),
-    "upsets": Trial(upset_figures, 8, 0, 90, profiles=False),
+    "upsets": Trial(partial(upset_figures, experiment=upsets.EXPERIMENT), 8, 0, 90, profiles=False),
     "skies": skies("cubestar", {"bright": {"mag_limit": 3.8}, **_FALSE, **_FOCAL}),
 }
 

@@ -3,28 +3,27 @@
 from collections import Counter
 from typing import Any
 
-from cubestack.host.experiments.measure import experiment_of
 from cubestack.host.studies.rows.estimate import rate_of
 from cubestack.host.studies.rows.trial import Figures
 from cubestack.host.studies.upsets.atlas import BAD, atlas
+from cubestack.host.studies.upsets.experiment import UpsetExperiment
 from cubestack.host.studies.upsets.sample import EFFECTS, UpsetResult
 
 FEW = "*ack"
 """Registers of a run without scenes."""
 
 
-def upset_figures(opened: Any, frames: int) -> Figures:
+def upset_figures(opened: Any, frames: int, *, experiment: UpsetExperiment) -> Figures:
     """Each bit once in each phase, in ``frames`` scenes; without any, only a few registers.
 
     By register and memory: numbers of bits and upsets, noticed ones per day, percentages that the
     processor noticed, and of answers that were refused and wrong. Of all: these percentages, and
     the number of each effect.
     """
-    experiment = experiment_of(opened.device, "upsets")
     results = list[UpsetResult]()
     for seed in range(max(frames, 1)):
         some = {} if frames else {"registers": FEW}
-        results += experiment.run(opened, experiment.options(frames=1, seed=seed, **some))
+        results += experiment.run(opened, experiment.options(frames=1, seed=seed, **some))  # type: ignore[arg-type]
     figures: dict[str, float] = {}
     parts = atlas(results)
     for part in parts:

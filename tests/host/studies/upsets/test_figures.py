@@ -1,7 +1,6 @@
 from types import SimpleNamespace
 from typing import Any
 
-from cubestack.host.devices.device import Report
 from cubestack.host.studies.upsets.figures import FEW, upset_figures
 from cubestack.host.studies.upsets.sample import UpsetResult
 
@@ -28,14 +27,9 @@ class Experiment:
         ]
 
 
-def opened(experiment: Experiment) -> Any:
-    report = Report("upsets", "flip bits", lambda: experiment)  # type: ignore[arg-type,return-value]
-    return SimpleNamespace(device=SimpleNamespace(name="walker", reports=(report,)))
-
-
 def test_each_scene_has_each_bit_once() -> None:
-    experiment = Experiment()
-    found = upset_figures(opened(experiment), 4)
+    experiment: Any = Experiment()
+    found = upset_figures(None, 4, experiment=experiment)
     assert experiment.asked == [{"frames": 1, "seed": seed} for seed in range(4)]
     assert (found["writer.ack upsets"], found["writer.ack bits"]) == (4, 1)
     assert (found["writer.ack seen"], found["writer.ack wrong"]) == (50, 50)
@@ -46,6 +40,6 @@ def test_each_scene_has_each_bit_once() -> None:
 
 
 def test_without_scenes_a_few_registers_show_what_runs() -> None:
-    experiment = Experiment()
-    upset_figures(opened(experiment), 0)
+    experiment: Any = Experiment()
+    upset_figures(None, 0, experiment=experiment)
     assert experiment.asked == [{"frames": 1, "seed": 0, "registers": FEW}]
