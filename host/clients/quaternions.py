@@ -88,9 +88,8 @@ def described(detected: int, identified: int, quality: AttitudeQuality) -> str:
     """Stars and attitude of an image in a sentence; without a rating, no accuracy."""
     across = max(quality.sigmas_rad[:2])
     known = across < UNKNOWN_RAD
-    accuracy = (
-        f"known to {math.degrees(across) * ARCSEC_PER_DEG:.2g} arcsec" if known else "measured"
-    )
+    arcsec = float(f"{math.degrees(across) * ARCSEC_PER_DEG:.2g}")
+    accuracy = f"known to {arcsec:g} arcsec" if known else "measured"
     return f"{identified} of {detected} stars identified, attitude {accuracy}"
 
 

@@ -144,7 +144,7 @@ def test_photographs_are_solved_lost_in_space(measure: Measure, photographs: Pat
 
 def _turning(profile: str, frames: int, rate_deg_s: float) -> list[Shot]:
     opened = Opener(device("cubestar"), board={"profile": profile})
-    return list(slewing_shots(opened, frames, rate_deg_s))
+    return [shot for shot, _ in slewing_shots(opened, frames, rate_deg_s)]
 
 
 @pytest.mark.parametrize("profile", PROFILES)

@@ -26,6 +26,7 @@ LEFT = {
     "hdl board ulx3s-12f --out": "a folder of a build",
     "demo --out": "a folder that each run fills again",
     "hazards --out": "rewrites tables of a page",
+    "compare --out": "rewrites tables of a page",
     "campaign --out": "refuses a folder with a campaign itself",
     "new-sensor --out": "refuses a folder that exists",
     "fidelity --write": "rewrites tables of pages",
