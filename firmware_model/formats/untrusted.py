@@ -172,15 +172,17 @@ def parse_json(
     ``name`` begins the text of an error; empty for none.
     """
     _check_length(text, name, error, largest)
+    what = f"{shown(name)} is not" if name else "not"
     try:
-        value = (_JSON if finite else _ANY_JSON).decode(
-            text if isinstance(text, str) else text.decode("utf-8")
-        )
+        plain = text if isinstance(text, str) else text.decode("utf-8")
+    except UnicodeDecodeError as found:
+        raise error(f"{what} UTF-8 text: byte {found.start}") from None
+    try:
+        value = (_JSON if finite else _ANY_JSON).decode(plain)
     except RecursionError:
         raise error(_named(name, _NESTED)) from None
     except ValueError as found:
-        what = f"{shown(name)} is not valid" if name else "not valid"
-        raise error(f"{what} JSON: {shown(str(found))}") from None
+        raise error(f"{what} valid JSON: {shown(str(found))}") from None
     _check(value, name, error, finite)
     return value
 

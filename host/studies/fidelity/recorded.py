@@ -19,7 +19,7 @@ from cubestack.host.studies.fidelity.table import (
     shown,
 )
 from cubestack.host.studies.fidelity.text import FOLDER
-from cubestack.host.studies.rows.record import load, measurement, save
+from cubestack.host.studies.rows.record import as_stored, load, measurement, save
 from cubestack.host.studies.rows.trace import Noted, Trace
 from cubestack.host.studies.rows.trial import Figures
 from cubestack.host.studies.workers import performed_afresh
@@ -84,6 +84,7 @@ def differences(job: Job, was: Figures, found: Figures) -> Iterator[str]:
     if was.keys() != found.keys():
         yield f"{job.device} {job.key}: other figures"
         return
+    found = as_stored(found)
     rows = rows_of(job)
     for row in rows:
         old, new = shown(row, was), shown(row, found)

@@ -96,6 +96,11 @@ def _value(stored: Any) -> float:
     return math.nan if stored is None else stored
 
 
+def as_stored(figures: Figures) -> Figures:
+    """Figures as they come back from a file: with ``DIGITS`` digits."""
+    return {name: _value(_stored(value)) for name, value in figures.items()}
+
+
 def _ranges(numbers: Iterable[int]) -> str:
     """As "0-57 60"."""
     found: list[list[int]] = []

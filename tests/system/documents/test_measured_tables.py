@@ -52,6 +52,7 @@ ELSEWHERE: dict[tuple[str, str], str] = {
     ("gateware-cubestar-next.md", "Design | Arrangement"): "tests/hdl/test_area.py compares",
     ("gateware-tests.md", "Group | Points"): "tests/hdl/coverage compares",
     ("how-to/attitude-loop.md", "sensors | largest"): "an example beside other programs; Basilisk",
+    ("how-to/campaigns-cluster.md", "skies"): f"{MACHINE}: `make bench-scale`",
     ("how-to/fpga-board.md", "for one image"): "counted in simulation of the board's gateware",
     ("how-to/fpga-board.md", "built with"): "of a placer that is not installed with the project",
     ("how-to/profiles.md", " | CubeStar"): DECLARED,
