@@ -8,8 +8,8 @@ from pathlib import Path
 
 from cubestack.host.studies.compare.study import Row, Rows
 from cubestack.host.studies.compare.tracker import Tracker, tracker, trackers
-from cubestack.host.studies.rows.record import Measurement, load, measurement, save
-from cubestack.host.studies.rows.trace import Trace
+from cubestack.host.studies.rows.record import load, measurement, save
+from cubestack.host.studies.rows.trace import Noted, Trace
 from cubestack.host.studies.workers import performed_afresh
 
 TRACED = 1  #: skies of each case that show what runs
@@ -39,14 +39,17 @@ def perform(job: Job) -> Iterator[Row]:
     yield from study.run(tracker(job.device), job.skies, job.seed)
 
 
-def measured_anew(job: Job) -> Measurement:
-    """Run a job in this process, which must be a new one: first few skies, to see what runs."""
+def measured_anew(job: Job) -> tuple[float, list[Row], Noted]:
+    """Run a job in this process, which must be a new one: first few skies, to see what runs.
+
+    Returns its processor time in s, its rows, and what ran.
+    """
     trace = Trace()
     with trace.running():
         list(perform(Job(job.study, job.device, TRACED, job.seed)))
     started = time.process_time()
     rows = list(perform(job))
-    return measurement(job.call, time.process_time() - started, figures(rows), trace.entries())
+    return time.process_time() - started, rows, trace.noted()
 
 
 def record_file(docs: Path) -> Path:
@@ -56,7 +59,8 @@ def record_file(docs: Path) -> Path:
 def renewed(docs: Path, jobs: Sequence[Job], workers: int) -> Iterator[Job]:
     """Run the jobs and store each as it ends."""
     path = record_file(docs)
-    for job, found in performed_afresh(measured_anew, jobs, workers):
+    for job, (seconds, rows, noted) in performed_afresh(measured_anew, jobs, workers):
+        found = measurement(job.call, seconds, figures(rows), noted.entries())
         save(path, load(path) | {job.key: found})
         yield job
 

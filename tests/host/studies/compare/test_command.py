@@ -41,6 +41,17 @@ def test_out_needs_a_folder_and_a_place_in_its_page(run: Run, tmp_path: Path) ->
 
 
 @pytest.mark.slow
+def test_renewed_rows_are_stored_with_what_they_depend_on(tmp_path: Path) -> None:
+    job = Job("attitude", "cubestar", 2, 1)
+    assert list(recorded.renewed(tmp_path, [job], 1)) == [job]
+    stored = load(recorded.record_file(tmp_path))[job.key]
+    assert stored.call == job.call
+    assert stored.figures.keys() == recorded.figures(list(perform(job))).keys()
+    assert any("attitude" in one for one in stored.depends)
+    assert not stored.changed
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("study", STUDIES)
 def test_json_has_an_object_per_method_and_case(run: Run, study: str) -> None:
     outcome = run("compare", study, "cubestar", "--skies", "1", "--json")
