@@ -71,7 +71,7 @@ def test_act_executes_shell_commands(controlled: Controlled) -> None:
         ("GET", "/stat", None, 404, "known: /back"),
         ("DELETE", "/state", None, 405, "Method Not Allowed"),
         ("POST", "/step", b"{", 400, "the body is not valid JSON"),
-        ("POST", "/step", b"\xff\xfe", 400, "the body is not valid JSON"),
+        ("POST", "/step", b"\xff\xfe", 400, "the body is not UTF-8 text"),
         ("POST", "/step", b"[" * 100_000, 400, "the body: lists and tables are nested"),
         ("POST", "/step", [], 400, "the body must be a JSON object with events"),
         ("POST", "/step", {"evnts": 1}, 400, "/step has no member 'evnts'; known: events"),
