@@ -3,8 +3,6 @@
 One line per image: a JSON list of ``[Hipparcos number, column, row]`` per star, in pixels.
 """
 
-import json
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -13,16 +11,9 @@ import numpy as np
 from cubestack.emulator.scene.hipparcos import load_sky
 from cubestack.firmware_model.formats.untrusted import LARGEST_TEXT, parse_json, read_lines
 from cubestack.host.calibration.stars import Sight
-from cubestack.host.clients.contract import FoundStar
 from cubestack.host.errors import CameraFileError
 
 FARTHEST_PX = 10_000.0  #: largest coordinate that is accepted
-
-
-def star_line(stars: Iterable[FoundStar]) -> str:
-    """The line of an image, without an end of line; stars without a name are left out."""
-    named = [[one.hipparcos, one.x_px, one.y_px] for one in stars if one.hipparcos is not None]
-    return json.dumps(named)
 
 
 def load_sights(path: Path) -> list[Sight]:

@@ -15,7 +15,6 @@ from cubestack.host.calibration.camera import load_camera
 from cubestack.host.cli.main import main
 from cubestack.host.devices.registry import device
 from cubestack.host.emulation.emulated import power_up
-from cubestack.host.studies.star_log import star_line
 
 UNIT = """
 kind = "sky"
@@ -63,12 +62,14 @@ def test_calibrate_finds_a_principal_point_from_stars_that_a_unit_reports(
             sky = SkyScene(random_quaternion(rng))
             emulated.scene = SkyView(sky, replace(CONDITION, hazards=(moved,), seed=number))
             emulated.client.capture_and_process()
-            log.write(star_line(emulated.client.stars()) + "\n")
-    found, tables = calibrate(capsys, "--stars", file), CONDITION.optics
-    assert found["camera"]["cx_px"] == pytest.approx(tables.cx + 8, abs=0.7)
-    assert found["camera"]["cy_px"] == pytest.approx(tables.cy, abs=0.7)
-    assert found["after_px"] < 0.15
-    assert found["lens_px"] is None
+            found = emulated.client.stars()
+            log.write(json.dumps([[s.hipparcos, s.x_px, s.y_px] for s in found if s.hipparcos]))
+            log.write("\n")
+    fitted, tables = calibrate(capsys, "--stars", file), CONDITION.optics
+    assert fitted["camera"]["cx_px"] == pytest.approx(tables.cx + 8, abs=0.7)
+    assert fitted["camera"]["cy_px"] == pytest.approx(tables.cy, abs=0.7)
+    assert fitted["after_px"] < 0.15
+    assert fitted["lens_px"] is None
 
 
 @pytest.mark.slow

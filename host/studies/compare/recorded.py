@@ -8,7 +8,7 @@ from pathlib import Path
 
 from cubestack.host.studies.compare.study import Row, Rows
 from cubestack.host.studies.compare.tracker import Tracker, tracker, trackers
-from cubestack.host.studies.rows.record import load, measurement, save
+from cubestack.host.studies.rows.record import load, measurement, save, staleness
 from cubestack.host.studies.rows.trace import Noted, Trace
 from cubestack.host.studies.workers import performed_afresh
 
@@ -93,13 +93,6 @@ def rows_of(device: str, stored: Mapping[str, float]) -> list[Row]:
 
 def stale(docs: Path, jobs: Sequence[Job]) -> dict[Job, str]:
     """Jobs that are not stored as they would be measured now, each with the reason."""
-    found, stored = {}, load(record_file(docs))
-    for job in jobs:
-        one = stored.get(job.key)
-        if one is None:
-            found[job] = "never measured"
-        elif one.call != job.call:
-            found[job] = f"it was {one.call}"
-        elif one.changed:
-            found[job] = f"changed since: {', '.join(one.changed)}"
-    return found
+    stored = load(record_file(docs))
+    reasons = {job: staleness(stored.get(job.key), job.call) for job in jobs}
+    return {job: reason for job, reason in reasons.items() if reason}

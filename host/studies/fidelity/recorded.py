@@ -19,7 +19,7 @@ from cubestack.host.studies.fidelity.table import (
     shown,
 )
 from cubestack.host.studies.fidelity.text import FOLDER
-from cubestack.host.studies.rows.record import as_stored, load, measurement, save
+from cubestack.host.studies.rows.record import as_stored, load, measurement, save, staleness
 from cubestack.host.studies.rows.trace import Noted, Trace
 from cubestack.host.studies.rows.trial import Figures
 from cubestack.host.studies.workers import performed_afresh
@@ -102,14 +102,9 @@ def stale(docs: Path, devices: Iterable[str]) -> dict[Job, str]:
     for device in devices:
         stored = load(record_file(docs, device))
         for job in all_jobs(device):
-            one = stored.get(job.key)
-            trial = fidelity_of(device).trials[job.trial]
-            if one is None:
-                found[job] = "never measured"
-            elif one.call != trial.call:
-                found[job] = f"it was {one.call}"
-            elif one.changed:
-                found[job] = f"changed since: {', '.join(one.changed)}"
+            call = fidelity_of(device).trials[job.trial].call
+            if reason := staleness(stored.get(job.key), call):
+                found[job] = reason
     return found
 
 

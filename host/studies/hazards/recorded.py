@@ -7,7 +7,7 @@ from pathlib import Path
 
 from cubestack.host.experiments.hazard_options import known
 from cubestack.host.studies.hazards.curves import Job, Point, perform
-from cubestack.host.studies.rows.record import load, measurement, save
+from cubestack.host.studies.rows.record import load, measurement, save, staleness
 from cubestack.host.studies.rows.trace import Noted, Trace
 from cubestack.host.studies.workers import performed_afresh
 
@@ -72,13 +72,6 @@ def renewed(docs: Path, curves: Sequence[Curve], workers: int) -> Iterator[Point
 
 def stale(docs: Path, curves: Iterable[Curve]) -> dict[Curve, str]:
     """Curves whose stored measurement is missing or of other code, each with the reason."""
-    stored, found = load(record_file(docs)), dict[Curve, str]()
-    for curve in curves:
-        one = stored.get(key(curve[0]))
-        if one is None:
-            found[curve] = "never measured"
-        elif one.call != call(curve):
-            found[curve] = f"it was {one.call}"
-        elif one.changed:
-            found[curve] = f"changed since: {', '.join(one.changed)}"
-    return found
+    stored = load(record_file(docs))
+    reasons = {curve: staleness(stored.get(key(curve[0])), call(curve)) for curve in curves}
+    return {curve: reason for curve, reason in reasons.items() if reason}

@@ -96,6 +96,15 @@ def _value(stored: Any) -> float:
     return math.nan if stored is None else stored
 
 
+def staleness(stored: Measurement | None, call: str) -> str:
+    """Why ``stored`` is not what ``call`` would measure now; empty if it is."""
+    if stored is None:
+        return "never measured"
+    if stored.call != call:
+        return f"it was {stored.call}"
+    return f"changed since: {', '.join(stored.changed)}" if stored.changed else ""
+
+
 def as_stored(figures: Figures) -> Figures:
     """Figures as they come back from a file: with ``DIGITS`` digits."""
     return {name: _value(_stored(value)) for name, value in figures.items()}

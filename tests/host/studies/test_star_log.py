@@ -1,28 +1,19 @@
+import json
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
 
 from cubestack.emulator.scene.hipparcos import load_sky
 from cubestack.host.errors import CameraFileError
-from cubestack.host.studies.star_log import load_sights, star_line
+from cubestack.host.studies.star_log import load_sights
 
 SIRIUS, VEGA = 32349, 91262
 
 
-def star(hipparcos: int | None, x_px: float, y_px: float) -> Any:
-    return SimpleNamespace(hipparcos=hipparcos, x_px=x_px, y_px=y_px)
-
-
-def test_stars_written_are_read_and_those_without_name_left_out(tmp_path: Path) -> None:
+def test_each_line_is_an_image_with_the_directions_of_its_stars(tmp_path: Path) -> None:
     path = tmp_path / "stars.jsonl"
-    lines = [
-        star_line([star(VEGA, 1.5, 2.0), star(None, 9.0, 9.0), star(SIRIUS, 3.0, 4.25)]),
-        "",
-        star_line([]),
-    ]
+    lines = [json.dumps([[VEGA, 1.5, 2.0], [SIRIUS, 3.0, 4.25]]), "", "[]"]
     path.write_text("\n".join(lines) + "\n", "utf-8")
     first, second = load_sights(path)
     sky = load_sky()
