@@ -30,6 +30,7 @@ from cubestack.host.recording.setups import read_document
 from cubestack.host.recording.transcript import transcript
 from cubestack.host.studies.campaign.folder import PLAN, ROWS, Folder
 from cubestack.host.studies.powerfail.scenario import Scenario
+from cubestack.host.studies.star_log import load_sights
 from tests.emulator.iss.gdb.fake_target import Talk
 
 FILE = "document"
@@ -226,6 +227,10 @@ READERS: dict[str, Reader] = {
     "camera": Reader(
         lambda folder: load_camera(folder / FILE),
         (b'{"camera": {"f_px": 1000.0, "cx_px": 512, "cy_px": 256.5, "k1": 0.1}}',),
+    ),
+    "stars": Reader(
+        lambda folder: load_sights(folder / FILE),
+        (b"[[32349, 1.5, 2], [91262, 30, 40.25]]\n\n[]\n",),
     ),
     "firmware": Reader(
         firmware, (_hex(VECTORS, 0), VECTORS, IMAGE.read_bytes()[:20_000], IMAGE.read_bytes())
