@@ -204,15 +204,17 @@ def _is_for_types(node: ast.AST) -> bool:
     )
 
 
-def _bound(statement: ast.stmt) -> Iterator[str]:
-    if isinstance(statement, (*_FUNCTIONS, ast.ClassDef)):
-        yield statement.name
-        return
-    for node in ast.walk(statement):
-        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
-            yield node.id
-        elif isinstance(node, (*_FUNCTIONS, ast.ClassDef)):
-            yield node.name
+def _bound(node: ast.AST) -> Iterator[str]:
+    """Names that a statement binds; those within functions, classes and comprehensions are not."""
+    if isinstance(node, (*_FUNCTIONS, ast.ClassDef)):
+        yield node.name
+    elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+        yield node.id
+    else:
+        # ``:=`` in a condition of a comprehension binds outside of it.
+        inner = node.ifs if isinstance(node, ast.comprehension) else ast.iter_child_nodes(node)
+        for child in inner:
+            yield from _bound(child)
 
 
 def _feed(hashed: blake2b, value: object) -> None:

@@ -151,3 +151,22 @@ def test_a_function_that_reads_a_source_depends_on_all_of_it(
     before = digests(entries)
     change(file, old, old[:-1] + "9")
     assert (digests(entries) != before) == counts
+
+
+BOUND = """
+FIRST, (SECOND, *REST) = [item for item in range(3) if (KEPT := item)]
+if FIRST:
+    def choice():
+        local = 1
+        return [local for each in REST]
+else:
+    choice = None
+"""
+
+
+def test_variables_of_comprehensions_and_functions_are_no_names_of_the_module(
+    change: Change, tmp_path: Path
+) -> None:
+    (tmp_path / "emulator" / "bound.py").write_text(BOUND)
+    defined = sources.source("emulator/bound.py").defined
+    assert {*defined} == {"FIRST", "SECOND", "REST", "KEPT", "choice"}
