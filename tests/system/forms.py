@@ -24,7 +24,7 @@ from tests.system.conftest import Ear
 from tests.system.life import life, pair_life
 
 SENSORS = ("cubestar", "aramis", "cubesense")
-LIGHTS = ("pixels", "spots", "globe")
+LIGHTS = ("distortion", "pixels", "spots", "globe")
 
 Seen = dict[str, Any]
 

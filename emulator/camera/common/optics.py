@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from cubestack.emulator.camera.common.hazards.contract import Lens
 from cubestack.emulator.camera.common.residual import Displacement, displace, restore
+from cubestack.emulator.light.distortion import Brown
 from cubestack.emulator.scene.file import SceneError
 from cubestack.firmware_model.values import (
     REQUIRED,
@@ -32,7 +33,6 @@ WIDEST_PSF_PX = 20.0
 """Largest standard deviation of a spot in px (assumed): few stars would still be visible."""
 
 Pixels = NDArray[np.float64]
-Numbers = NDArray[np.float64]
 
 
 class Distortion(Enum):
@@ -137,9 +137,9 @@ class Optics(DeclaredValues):
         pixels = np.full((len(v), 2), np.nan)
         undistorted = plane[imaged] * self._focal_px / self._scale
         if self.distortion is Distortion.TOOLBOX:
-            distorted = self._polynomial(undistorted, -1)
+            distorted = (-self._brown).of(undistorted)
         else:
-            distorted = self._inverse_polynomial(undistorted, +1)
+            distorted = self._brown.inverse(undistorted)
         pixels[imaged] = displace(distorted * self._scale + (self.cx, self.cy), self.residuals)
         return pixels
 
@@ -157,9 +157,9 @@ class Optics(DeclaredValues):
         points = restore(np.asarray(pixels, np.float64), self.residuals)
         distorted = (points - (self.cx, self.cy)) / self._scale
         if self.distortion is Distortion.TOOLBOX:
-            undistorted = self._inverse_polynomial(distorted, -1)
+            undistorted = (-self._brown).inverse(distorted)
         else:
-            undistorted = self._polynomial(distorted, +1)
+            undistorted = self._brown.of(distorted)
         plane = undistorted * self._scale / self._focal_px
         vectors = np.concatenate([plane, np.ones((len(plane), 1))], axis=1)
         vectors /= np.linalg.norm(vectors, axis=1, keepdims=True)
@@ -202,6 +202,10 @@ class Optics(DeclaredValues):
         x, y = self.columns - 0.5, self.rows - 0.5
         return np.array([[-0.5, -0.5], [x, -0.5], [-0.5, y], [x, y]])
 
+    @cached_property
+    def _brown(self) -> Brown:
+        return Brown(self.k1, self.k2, self.p1, self.p2)
+
     @property
     def _focal_px(self) -> float:
         return self.focal_length_mm * 1000 / self.pixel_pitch_um
@@ -225,45 +229,3 @@ class Optics(DeclaredValues):
         edge = np.concatenate([np.stack(side, axis=1) for side in sides])
         vectors = self.unproject(edge * (self.columns, self.rows) - 0.5)
         return np.asarray(np.abs(vectors[:, :2] / vectors[:, 2:]).max(axis=0))
-
-    def _polynomial(self, points: Pixels, sign: int) -> Pixels:
-        """Equations 4.1.3 and 4.1.4 on normalised points, the coefficients times ``sign``."""
-        x, y = points.T
-        across, down, _, _ = self._terms(x, y, sign)
-        return np.stack([across, down], axis=1)
-
-    def _terms(
-        self, x: Numbers, y: Numbers, sign: int
-    ) -> tuple[Numbers, Numbers, Numbers, Numbers]:
-        """The same of coordinates (n,), with the squared radius and the radial factor."""
-        r2 = x * x + y * y
-        radial = 1 + sign * r2 * (self.k1 + self.k2 * r2)
-        p1, p2 = sign * self.p1, sign * self.p2
-        across = x * radial + p2 * (r2 + 2 * x * x) + 2 * p1 * x * y
-        down = y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
-        return across, down, r2, radial
-
-    @np.errstate(all="ignore")  # a search that does not converge may leave the range of numbers
-    def _inverse_polynomial(self, targets: Pixels, sign: int) -> Pixels:
-        """Points that ``_polynomial`` maps to ``targets``, by Newton's method; NaN if none."""
-        wanted_x, wanted_y = np.ascontiguousarray(targets.T)
-        x, y = wanted_x.copy(), wanted_y.copy()
-        p1, p2 = sign * self.p1, sign * self.p2
-        for _ in range(20):
-            across, down, r2, radial = self._terms(x, y, sign)
-            slope = 2 * sign * (self.k1 + 2 * self.k2 * r2)  # of radial, by r2, doubled
-            jxx = radial + slope * x * x + 6 * p2 * x + 2 * p1 * y
-            jyy = radial + slope * y * y + 6 * p1 * y + 2 * p2 * x
-            jxy = slope * x * y + 2 * p2 * y + 2 * p1 * x
-            ex, ey = across - wanted_x, down - wanted_y
-            determinant = jxx * jyy - jxy * jxy
-            step_x = (jyy * ex - jxy * ey) / determinant
-            step_y = (jxx * ey - jxy * ex) / determinant
-            x -= step_x
-            y -= step_y
-            found = np.maximum(np.abs(step_x), np.abs(step_y)) < 1e-14
-            if found.all():
-                return np.stack([x, y], axis=1)
-        points = np.stack([x, y], axis=1)
-        points[~found] = np.nan
-        return points

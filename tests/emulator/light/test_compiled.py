@@ -8,6 +8,7 @@ import pytest
 
 from cubestack.emulator.camera.mlx75412.sensor import Mlx75412
 from cubestack.emulator.light import globe, library, pixels, spots
+from cubestack.emulator.light.distortion import Brown
 from cubestack.emulator.light.noise import FrameNoise
 from cubestack.emulator.light.pixels import PixelModel
 from cubestack.emulator.native import compiler
@@ -91,6 +92,20 @@ def test_spots_are_equal(sigma_px: float, monkeypatch: pytest.MonkeyPatch) -> No
     expected = spots.spots(places, charge, sigma_px, SHAPE)
     assert expected.max() > 0
     np.testing.assert_array_equal(found, expected)
+
+
+@needs_compiler
+@pytest.mark.parametrize("seed", range(6))
+def test_points_without_distortion_are_equal(seed: int) -> None:
+    """Some of the points have none: the strongest lenses fold the picture."""
+    rng = np.random.default_rng(seed)
+    lens = Brown(*rng.normal(0, 0.1 * seed, 4))
+    targets = rng.uniform(-0.9, 0.9, (3001, 2))
+    expected = lens.reference(targets)
+    np.testing.assert_array_equal(lens.compiled(library.light_library(), targets), expected)
+    found = np.isfinite(expected).all(axis=1)
+    assert found.sum() > 300
+    np.testing.assert_allclose(lens.of(expected[found]), targets[found], atol=1e-12)
 
 
 @needs_compiler
