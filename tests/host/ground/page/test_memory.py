@@ -1,4 +1,4 @@
-"""Memory of the page and of its server during eight simulated hours.
+"""Memory of the page and of its server during two simulated hours, on each seventh day eight.
 
 Each is tested alone, because both together mostly wait for each other: the server sends to
 programs, and the page receives from a WebSocket in its own browser.
@@ -15,6 +15,8 @@ from typing import Any, NamedTuple
 import pytest
 from websockets.sync.client import connect
 
+from tests.tiers import DAY
+
 from ..browser import shown
 from ..conftest import SOON_S
 
@@ -23,8 +25,8 @@ pytestmark = [pytest.mark.xdist_group("page hours"), pytest.mark.slow]
 TABS = 8
 FRAMES = ["AttitudeQuaternion", "TaskStatus", "PerformanceParameters"]
 
-END_S = 8 * 3600
-BEGIN_S = END_S // 10
+END_S = (2 if DAY % 7 else 8) * 3600
+BEGIN_S = 2880
 
 MOST_GROWTH = 1 << 20
 """Bytes, of the page's heap and of the server's memory."""
