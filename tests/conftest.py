@@ -1,6 +1,8 @@
 """Runs the command in-process; Hypothesis uses the same examples everywhere."""
 
+import contextlib
 import gc
+import importlib
 import shutil
 import subprocess
 import sys
@@ -32,6 +34,33 @@ class Outcome(NamedTuple):
 
 
 Run = Callable[..., Outcome]
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    if config.option.dist != "loadgroup":
+        return None
+    from tests.scheduling import Groups
+
+    return Groups(config, log)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection(session: pytest.Session) -> None:
+    """Each worker compiles another part of the tests first, so that none is compiled by all.
+
+    In a fresh clone pytest's rewriting of assertions takes longer than all other collection.
+    """
+    worker = getattr(session.config, "workerinput", None)
+    if worker is None or sys.dont_write_bytecode:
+        return
+    root = session.config.rootpath
+    places = [root / argument.partition("::")[0] for argument in session.config.args]
+    files = sorted({file for place in places for file in place.rglob("test_*.py")})
+    first = len(files) * int(worker["workerid"].removeprefix("gw")) // worker["workercount"]
+    for file in files[first:] + files[:first]:
+        with contextlib.suppress(Exception, pytest.skip.Exception):  # reported when it is collected
+            importlib.import_module(".".join(file.relative_to(root).with_suffix("").parts))
 
 
 @pytest.hookimpl(tryfirst=True)
