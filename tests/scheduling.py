@@ -5,7 +5,7 @@ from typing import Any
 
 from xdist.scheduler import LoadGroupScheduling
 
-#: A worker gets a test more at a time for each so many that wait.
+#: Waiting tests for each further test that a worker gets at a time.
 WAITING_PER_TEST = 1000
 
 
