@@ -1,7 +1,7 @@
 // Drives a compiled FPGA with pixel clocks, data clocks and SRAMs. Each CompiledEngine owns one
 // driver; contract.py documents the calls. pins_header.py generates pins.h from the wiring.
 
-#include "bursts.h"
+#include "reading.h"
 
 namespace {
 
@@ -23,30 +23,9 @@ struct Transactions {
 struct Transactions;
 #endif
 
-class Driver : public Bursts {
+class Driver : public Reading {
 public:
-    using Bursts::Bursts;
-
-    // Runs the microcontroller's transfer loop; clock edges are at start + floor of `halves`.
-    __attribute__((flatten)) void strobe(uint8_t *out, int64_t count, int64_t start, Steps halves) {
-        for (int64_t i = 0; i < count; i++) {
-            if (strides)
-                if (const int64_t read = read_strides(out + i, count - i, start, halves, 2 * i)) {
-                    i += read;
-                    halves.go_to(2 * i);
-                }
-            const int64_t rise = start + halves.value();
-            if (!top.DATA_CLOCK.get<bool>())
-                sample(rise);
-            top.DATA_CLOCK.set<bool>(true);
-            settle(rise);
-            halves.next();
-            out[i] = top.DATA.get<uint8_t>();
-            top.DATA_CLOCK.set<bool>(false);
-            settle(start + halves.value());
-            halves.next();
-        }
-    }
+    using Reading::Reading;
 
 #ifdef BUS_HIGH
     // Runs the events of `wanted` from number `event` on, and before each one the edges of the
@@ -120,43 +99,6 @@ private:
             top.BUS_READ.set<bool>(level);
     }
 #endif
-
-    // Reads a stride into `out` in one step, leaving at least the last of `count` bytes; returns
-    // the number of bytes. The next edge is number `edge` of `halves`.
-    int64_t read_strides(uint8_t *out, int64_t count, int64_t start, Steps halves, int64_t edge) {
-        return read_strides(out, count, start, halves, edge,
-                            std::make_integer_sequence<int, STRIDE_COUNT>());
-    }
-    template <int... K>
-    int64_t read_strides(uint8_t *out, int64_t count, int64_t start, Steps halves, int64_t edge,
-                         std::integer_sequence<int, K...>) {
-        int64_t read = 0;
-        (void)(... || (read = read_stride<K>(out, count, start, halves, edge)));
-        return read;
-    }
-    template <int K>
-    int64_t read_stride(uint8_t *out, int64_t count, int64_t start, Steps halves, int64_t edge) {
-        if constexpr (Stride<K>::camera < 0) {
-            constexpr std::integral_constant<int, K> stride;
-            Sram &sram = srams[Stride<K>::memory];
-            if (count <= SHORTEST_STRIDE || top.DATA_CLOCK.get<bool>() || !stride_ready(stride, top))
-                return 0;
-            const int64_t counter = stride_counter(stride, top);
-            const int64_t clocks = std::min(count, Stride<K>::last - counter) - 1;
-            const int64_t rise = start + halves.value();
-            halves.go_to(edge + 2);
-            const int64_t period = start + halves.value() - rise - 1;
-            if (clocks < SHORTEST_STRIDE || !sram.offers_at(rise, period))
-                return 0;
-            halves.go_to(edge + 2 * (clocks - 1));
-            sram.offer(out, clocks, start + halves.value());
-            stride_to(stride, top, counter + clocks, out[clocks - 1]);
-            Memory<Stride<K>::memory>::offer(top, sram.bus());
-            clocks_at_once += clocks;
-            return clocks;
-        }
-        return 0;
-    }
 };
 
 }  // namespace
@@ -179,7 +121,7 @@ int32_t driver_pin(const char *name) {
 }
 
 void driver_set(Driver *driver, int32_t pin, uint32_t value, int64_t now) {
-    driver->set(PIN_TABLE[pin], value, now);
+    driver->set(pin, value, now);
 }
 
 uint32_t driver_get(const Driver *driver, int32_t pin) { return PIN_TABLE[pin].get(driver->top); }
@@ -188,7 +130,7 @@ uint32_t driver_get(const Driver *driver, int32_t pin) { return PIN_TABLE[pin].g
 void driver_replay(Driver *driver, int64_t count, const int64_t *times, const int32_t *pins,
                    const uint32_t *levels, int32_t watched, const int32_t *outputs, uint32_t *out) {
     for (int64_t n = 0; n < count; n++) {
-        driver->set(PIN_TABLE[pins[n]], levels[n], times[n]);
+        driver->set(pins[n], levels[n], times[n]);
         for (int32_t k = 0; k < watched; k++)
             *out++ = PIN_TABLE[outputs[k]].get(driver->top);
     }

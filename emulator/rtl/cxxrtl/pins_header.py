@@ -17,7 +17,7 @@ def pins_header(wiring: Wiring, design: str, variants: Sequence[str] = ()) -> st
     - PINS: INPUT(name, port, initial level) and OUTPUT(name, port) of every pin.
     - CAMERAS: CAMERA(number, clock, data, line, statement that sets the frame pin to ``level``).
     - MEMORIES: MEMORY(number, A, D_I, D_O, D_OE, CE_N, OE_N, WE_N).
-    - DATA_CLOCK_NAME, DATA_CLOCK, DATA: pins of the transfer loop.
+    - DATA_CLOCK, DATA: pins of the transfer loop; DATA_CLOCK_NUMBER: the number of its clock.
     - BUS_HIGH, BUS_LOW_I, BUS_LOW_O, BUS_LOW_OE, BUS_LATCH, BUS_READ, BUS_WRITE: pins of the
       external bus, if there is one; BUS_SELECTS: SELECT(number, port) of every chip select.
     - ACKNOWLEDGES, CONTENTION: levels in one word each.
@@ -39,7 +39,7 @@ def pins_header(wiring: Wiring, design: str, variants: Sequence[str] = ()) -> st
         "CAMERAS": " ".join(_camera(n, camera) for n, camera in enumerate(wiring.cameras)),
         "MEMORY_COUNT": str(len(wiring.memories)),
         "MEMORIES": " ".join(_memory(n, memory) for n, memory in enumerate(wiring.memories)),
-        "DATA_CLOCK_NAME": f'"{wiring.data_clock}"',
+        "DATA_CLOCK_NUMBER": str(list(wiring.widths).index(wiring.data_clock)),
         "DATA_CLOCK": port(wiring.data_clock),
         "DATA": port(wiring.data),
         "ACKNOWLEDGES": f"({acknowledges})",

@@ -37,8 +37,6 @@ public:
     bool unsettled = false;  // the design oscillates
 
     void set(const Pin &pin, uint32_t value, int64_t now) {
-        if (strcmp(pin.name, DATA_CLOCK_NAME) == 0 && value && !top.DATA_CLOCK.get<bool>())
-            sample(now);
         pin.set(top, value);
         settle(now);
     }

@@ -102,6 +102,37 @@ def test_both_engines_read_the_same_bytes(seed: int) -> None:
         assert engines[0].stride_clocks > 10_000
 
 
+@pytest.mark.parametrize("timing", [None, SLOW_PARTS[-1]])
+def test_single_edges_of_the_data_clock_read_the_same_bytes(timing: SramTiming | None) -> None:
+    rng = np.random.default_rng(2)
+    wiring = cubestar_wiring()
+    seen = (*wiring.output_pins, *wiring.mcu_pins)
+    with both(wiring, timing) as engines:
+        engines[0].sram[:] = engines[1].sram[:] = rng.integers(0, 256, 2 * COLUMNS * ROWS)
+
+        def set_pin(name: str, level: int, later_ps: int) -> None:
+            for engine in engines:
+                engine.run(engine.now_ps + later_ps)
+                engine.set_pin(name, level)
+            ours, reference = (
+                ([(pin, engine.get_pin(pin)) for pin in seen], engine.state()) for engine in engines
+            )
+            assert ours == reference, (name, level, engines[0].now_ps)
+
+        for name, level in (("ENABLE", 0), ("RNW", 1), ("ENABLE", 1)):
+            set_pin(name, level, 10**6)
+        for number in range(5 * COLUMNS):
+            high = number % 2 == 0 if rng.random() < 0.98 else rng.random() < 0.5
+            set_pin(wiring.data_clock, int(high), int(rng.integers(1, 900_000)))
+            if number < COLUMNS and rng.random() < 0.01:  # later to the row's end and beyond
+                name = ("ENABLE", "RNW", "BANK")[int(rng.integers(3))]
+                set_pin(name, 0, 10**6)
+                set_pin(name, 1, 10**6)
+        step(engines, lambda engine: engine.run(engine.now_ps + 10**6), "end")
+        assert engines[0].stride_clocks > (COLUMNS if timing is None else 100)
+        assert engines[1].stride_clocks == 0
+
+
 @pytest.mark.parametrize("timing", SLOW_PARTS)
 def test_both_engines_report_the_same_violations_of_a_slow_memory(timing: SramTiming) -> None:
     rng = np.random.default_rng(1)
