@@ -42,9 +42,11 @@ public:
     static constexpr int64_t POLL_INTERVAL = efm32gg::MICROSECOND;
 
     FpgaLink(efm32gg::Part &part, const FpgaDriver &fpga, const FpgaWire *given, int32_t count)
-        : part(part), fpga(fpga), wires(given, given + count), driven(count), reported(count) {
-        for (const FpgaWire &wire : wires)
+        : part(part), fpga(fpga), wires(given, given + count), reported(count) {
+        for (const FpgaWire &wire : wires) {
             (wire.input ? part_inputs : part_outputs)[wire.port] |= mask_of(wire) << wire.bit;
+            (wire.input ? inputs : outputs)[wire.port].push_back(wire);
+        }
     }
 
     ~FpgaLink() { part.cancel(polling); }
@@ -52,23 +54,20 @@ public:
     uint32_t input_levels(int port, int64_t now) override {
         advance(now);
         uint32_t levels = 0;
-        for (const FpgaWire &wire : wires)
-            if (wire.port == port && wire.input)
-                levels |= (level(wire, now) & mask_of(wire)) << wire.bit;
+        for (const FpgaWire &wire : inputs[port])
+            levels |= (level(wire, now) & mask_of(wire)) << wire.bit;
         return levels;
     }
 
     void outputs_changed(int port, uint32_t changed, uint32_t levels, int64_t now) override {
-        for (std::size_t n = 0; n < wires.size(); n++) {
-            const FpgaWire &wire = wires[n];
-            if (wire.port != port || wire.input || !(changed >> wire.bit & mask_of(wire)))
-                continue;
-            driven[n] = levels >> wire.bit & mask_of(wire);
+        for (const FpgaWire &wire : outputs[port]) {
+            if (!(changed >> wire.bit & mask_of(wire))) continue;
+            const uint32_t driven = levels >> wire.bit & mask_of(wire);
             advance(now);
             if (compiled())
-                fpga.set(fpga.driver, wire.pin, driven[n], now);
+                fpga.set(fpga.driver, wire.pin, driven, now);
             else
-                fpga.slow_set(wire.pin, driven[n], now);
+                fpga.slow_set(wire.pin, driven, now);
         }
     }
 
@@ -107,7 +106,7 @@ private:
     efm32gg::Part &part;
     const FpgaDriver fpga;
     std::vector<FpgaWire> wires;
-    std::vector<uint32_t> driven;    // by wire: level of the FPGA's pin
+    std::vector<FpgaWire> inputs[PORTS], outputs[PORTS];    // by port, in their order
     std::vector<uint32_t> reported;  // by wire: level last reported to the part
     uint32_t running = 0;
     efm32gg::Event polling = efm32gg::Event::of<&FpgaLink::poll>(this);

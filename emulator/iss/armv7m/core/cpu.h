@@ -181,6 +181,7 @@ private:
         uint8_t *marks = nullptr;      // one per 64 bytes: code was decoded there
         uint32_t read_limit = 0, write_limit = 0;    // bytes from the page's start
         uint8_t read_wait = 0, write_wait = 0;
+        bool outside = false;          // nothing but Bus answers, and nothing watches
     };
     struct FreeCode {
         void operator()(Operation *operations) const;
@@ -208,6 +209,10 @@ private:
     Result store_data(uint32_t address, uint32_t size, uint32_t value, bool as_privileged,
                       uint64_t executed);
     Result access(uint32_t address, uint32_t size, uint32_t &value, bool write, bool privileged);
+    Result load_slowly(uint32_t address, uint32_t size, uint32_t &value, bool as_privileged,
+                       uint64_t executed);
+    Result store_slowly(uint32_t address, uint32_t size, uint32_t value, bool as_privileged,
+                        uint64_t executed);
     Result access_bit(uint32_t address, uint32_t size, uint32_t &value, bool write);
     Result access_pieces(uint32_t address, uint32_t size, uint32_t &value, bool write,
                          bool as_privileged);

@@ -111,6 +111,23 @@ bool Cpu::abandon(const Operation *op, Result result, bool write) {
     }
 }
 
+// Loads and stores beside the fast path: most are a peripheral's or external memory's.
+__attribute__((noinline)) Result Cpu::load_data(uint32_t address, uint32_t size, uint32_t &value,
+                                                bool as_privileged, uint64_t executed) {
+    if (UNLIKELY(!pages[address >> 20].outside || address & (size - 1)))
+        return load_slowly(address, size, value, as_privileged, executed);
+    fault_address = address;
+    return bus.read(address, size, value) ? Result::Done : Result::BusError;
+}
+
+__attribute__((noinline)) Result Cpu::store_data(uint32_t address, uint32_t size, uint32_t value,
+                                                 bool as_privileged, uint64_t executed) {
+    if (UNLIKELY(!pages[address >> 20].outside || address & (size - 1)))
+        return store_slowly(address, size, value, as_privileged, executed);
+    fault_address = address;
+    return bus.write(address, size, value) ? Result::Done : Result::BusError;
+}
+
 // Counts a step that ended at `next`.
 bool Cpu::stepped(uint32_t next) {
     if (steps_left == 0 || (next >= step_low && next < step_high) || --steps_left > 0) return false;

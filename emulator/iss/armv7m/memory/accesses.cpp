@@ -41,9 +41,15 @@ Cpu::Code &Cpu::code_of(const Region &region) {
 }
 
 void Cpu::regions_changed() {
-    pages.assign(1u << 12, Page());
     const bool guarded = system != nullptr && system->mpu.enabled();
+    pages.assign(1u << 12, Page());
+    for (uint32_t number = 0; number < pages.size() && !guarded && watches.empty(); number++)
+        pages[number].outside = !in_private_bus(number * PAGE) && !in_bit_band(number * PAGE);
     for (const Region &region : regions) {
+        for (uint32_t offset = 0; offset < region.size; offset += PAGE)
+            pages[(region.base + offset) / PAGE].outside = false;
+        if (region.size != 0)
+            pages[(region.base + region.size - 1) / PAGE].outside = false;
         const Code &code = code_of(region);
         if (region.base % PAGE != 0) continue;    // accesses go through find_region
         for (uint32_t offset = 0; offset < region.size; offset += PAGE) {
@@ -128,14 +134,14 @@ bool Cpu::stops_at_watch(uint32_t address, uint32_t size, uint32_t value, bool w
 }
 
 // The accesses of instructions: a watchpoint stops before them.
-Result Cpu::load_data(uint32_t address, uint32_t size, uint32_t &value, bool as_privileged,
-                      uint64_t executed) {
+Result Cpu::load_slowly(uint32_t address, uint32_t size, uint32_t &value, bool as_privileged,
+                        uint64_t executed) {
     if (stops_at_watch(address, size, 0, false, executed)) return Result::Watched;
     return access_pieces(address, size, value, false, as_privileged);
 }
 
-Result Cpu::store_data(uint32_t address, uint32_t size, uint32_t value, bool as_privileged,
-                       uint64_t executed) {
+Result Cpu::store_slowly(uint32_t address, uint32_t size, uint32_t value, bool as_privileged,
+                         uint64_t executed) {
     if (stops_at_watch(address, size, value, true, executed)) return Result::Watched;
     return access_pieces(address, size, value, true, as_privileged);
 }

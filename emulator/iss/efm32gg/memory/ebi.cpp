@@ -127,7 +127,8 @@ uint32_t Ebi::memory_access(const Bank &bank, uint32_t offset, int size, uint32_
     return value;
 }
 
-bool Ebi::access(uint32_t address, int size, uint32_t &value, bool write, int64_t &wait) {
+__attribute__((flatten)) bool Ebi::access(uint32_t address, int size, uint32_t &value, bool write,
+                                          int64_t &wait) {
     uint32_t offset;
     const int number = bank_of(address, offset);
     if (number > 3 || !banks[number].enabled) return report(number);

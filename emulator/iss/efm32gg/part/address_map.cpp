@@ -32,7 +32,7 @@ Peripheral *Part::peripheral_at(uint32_t address) const {
 }
 
 bool Part::access_allowed(const Peripheral &unit) {
-    if (enabled(unit.instance)) return true;
+    if (cmu->enabled(unit.instance)) return true;
     log_once("%s is accessed without its clock", unit.instance.name);
     return false;
 }
@@ -104,14 +104,15 @@ bool Part::store(uint32_t address, int size, uint32_t value, int64_t &wait) {
     return false;
 }
 
-bool Part::read(uint32_t address, uint32_t size, uint32_t &value) {
+// Most instructions that come here poll a register or walk through external memory.
+__attribute__((flatten)) bool Part::read(uint32_t address, uint32_t size, uint32_t &value) {
     int64_t wait = 0;
     const bool answered = load(address, (int)size, value, wait);
     cpu.cycles += wait;
     return answered;
 }
 
-bool Part::write(uint32_t address, uint32_t size, uint32_t value) {
+__attribute__((flatten)) bool Part::write(uint32_t address, uint32_t size, uint32_t value) {
     int64_t wait = 0;
     const bool answered = store(address, (int)size, value, wait);
     cpu.cycles += wait;

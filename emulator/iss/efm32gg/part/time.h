@@ -31,6 +31,9 @@ public:
         numerator /= common;
         denominator = hertz / common;
         short_reach = (int64_t)(INT64_MAX / numerator) - 1;
+        while (denominator > (int64_t)1 << bits)
+            bits++;
+        reciprocal = (uint64_t)((((unsigned __int128)1 << (63 + bits)) + denominator - 1) / denominator);
         short_span = numerator > INT64_MAX ? 0 : INT64_MAX / denominator - 1;
     }
 
@@ -42,7 +45,7 @@ public:
     int64_t time(int64_t k) const {
         if (!hertz) return NEVER;
         if (k >= 0 && k < short_reach)
-            return later(origin, k * (int64_t)numerator / denominator);
+            return later(origin, quotient((uint64_t)(k * (int64_t)numerator)));
         return picoseconds(origin + numerator * k / denominator);
     }
 
@@ -79,6 +82,14 @@ private:
     __int128 numerator = 1;
     int64_t denominator = 1;
     int64_t short_reach = 0, short_span = 0;  // edges and times whose products fit into 64 bits
+    // 2^(63 + bits) / denominator, rounded up, where 2^bits is the first power that reaches the
+    // denominator: exact for dividends below 2^63 (Granlund and Montgomery 1994, theorem 4.2).
+    uint64_t reciprocal = (uint64_t)1 << 63;
+    int bits = 0;
+
+    int64_t quotient(uint64_t dividend) const {
+        return (int64_t)((unsigned __int128)dividend * reciprocal >> (63 + bits));
+    }
 
     static __int128 gcd(__int128 a, __int128 b) {
         while (b) {

@@ -17,7 +17,7 @@ static constexpr uint32_t PORT_SIZE = 0x24;
 // Pins that wake from EM4, in the order of EM4WUEN: data sheet, table of alternate functions.
 static constexpr int EM4_PINS[] = {0 * 16 + 0, 0 * 16 + 6, 2 * 16 + 9,
                                    5 * 16 + 1, 5 * 16 + 2, 4 * 16 + 13};
-static constexpr int PRS_SOURCE = 48;    // pins 0 to 7; 8 to 15 are the next
+static constexpr int PRS_SOURCE = Prs::PINS;
 
 void Gpio::reset() {
     const uint32_t cause = reg(EM4WUCAUSE);
@@ -26,10 +26,20 @@ void Gpio::reset() {
         reg(EM4WUCAUSE) = cause;
     for (auto &owner : owners)
         owner = nullptr;
+    interrupts_selected();
     for (int port = 0; port < PORTS; port++) {
         ports[port].functions = ports[port].function_levels = 0;
         modes_changed(port);
         refresh(port, 0xFFFF);
+    }
+}
+
+void Gpio::interrupts_selected() {
+    for (int port = 0; port < PORTS; port++) {
+        uint32_t &selected = ports[port].interrupting;
+        selected = 0;
+        for (int bit = 0; bit < PINS; bit++)
+            selected |= (uint32_t)(interrupting_port(bit) == port) << bit;
     }
 }
 
@@ -38,10 +48,13 @@ uint32_t Gpio::mode(int port, int bit) const {
 }
 
 void Gpio::modes_changed(int port) {
-    uint32_t &enabled = ports[port].enabled;
-    enabled = 0;
-    for (int bit = 0; bit < PINS; bit++)
-        enabled |= (uint32_t)(mode(port, bit) != DISABLED) << bit;
+    uint32_t &enabled = ports[port].enabled, &pushing = ports[port].pushing;
+    enabled = pushing = 0;
+    for (int bit = 0; bit < PINS; bit++) {
+        const uint32_t pin_mode = mode(port, bit);
+        enabled |= (uint32_t)(pin_mode != DISABLED) << bit;
+        pushing |= (uint32_t)(pin_mode == PUSHPULL || pin_mode == PUSHPULLDRIVE) << bit;
+    }
 }
 
 uint32_t Gpio::peek(uint32_t offset) const {
@@ -84,7 +97,10 @@ void Gpio::write(uint32_t offset, uint32_t value) {
         if (value & CMD_EM4WUCLR)
             reg(EM4WUCAUSE) = 0;
     } else {
-        change_heed([&] { Peripheral::write(offset, value); });
+        change_heed([&] {
+            Peripheral::write(offset, value);
+            interrupts_selected();
+        });
     }
 }
 
@@ -156,9 +172,11 @@ void Gpio::drive_from_outside(int port, int bit, int level) {
 void Gpio::refresh(int port, uint32_t pins) {
     Port &one = ports[port];
     const uint32_t dout = reg(at(port, PA_DOUT));
-    uint32_t driven = one.driven & ~pins, out = one.driven_levels & ~pins;
-    uint32_t seen = levels[port] & ~pins;
-    for (uint32_t rest = pins; rest; rest &= rest - 1) {
+    const uint32_t simple = pins & one.pushing & ~one.functions;
+    uint32_t driven = (one.driven & ~pins) | simple;
+    uint32_t out = (one.driven_levels & ~pins) | (dout & simple);
+    uint32_t seen = (levels[port] & ~pins) | (dout & simple);
+    for (uint32_t rest = pins & ~simple; rest; rest &= rest - 1) {
         const uint32_t mask = rest & -rest;
         const uint32_t pin_mode = mode(port, __builtin_ctz(mask));
         const bool set = (one.functions & mask ? one.function_levels : dout) & mask;
@@ -200,6 +218,12 @@ void Gpio::refresh(int port, uint32_t pins) {
 void Gpio::set_levels(int port, uint32_t now_levels) {
     const uint32_t changed = levels[port] ^ now_levels;
     levels[port] = now_levels;
+    if (changed && !heeded(changed)) {
+        const Port &one = ports[port];
+        if (reg(INSENSE) & INSENSE_PRS)
+            part.prs->note_pins(changed & one.enabled & one.interrupting, now_levels);
+        return;
+    }
     for (uint32_t rest = changed; rest; rest &= rest - 1) {
         const int bit = __builtin_ctz(rest);
         edge(port, bit, now_levels >> bit & 1);
@@ -217,6 +241,11 @@ void Gpio::edge(int port, int bit, bool level) {
     }
     for (Peripheral *one : listeners)
         one->pin_changed(port, bit, level);
+}
+
+bool Gpio::heeded(uint32_t changed) const {
+    return part.mode == 4 || !listeners.empty() || changed & (reg(EXTIRISE) | reg(EXTIFALL)) ||
+           part.prs->listens_to_pins();
 }
 
 int Gpio::interrupting_port(int bit) const {

@@ -56,6 +56,8 @@ private:
         uint32_t outside = 0, outside_levels = 0;       // pins driven from outside
         uint32_t driven = 0, driven_levels = 0;         // pins that the part drives
         uint32_t enabled = 0;                           // pins whose mode allows reading
+        uint32_t pushing = 0;                           // pins whose mode drives both levels
+        uint32_t interrupting = 0;                      // pins that EXTIPSEL selects
     };
 
     Port ports[PORTS];
@@ -69,10 +71,13 @@ private:
     void write_port(int port, uint32_t offset, uint32_t value);
     void refresh(int port, uint32_t pins);
     void set_levels(int port, uint32_t now_levels);
+    // Whether changes of these pins of any port do more than change levels and PRS signals.
+    bool heeded(uint32_t changed) const;
     void edge(int port, int bit, bool level);
     // The port that can interrupt with its pin `bit` (EXTIPSEL).
     int interrupting_port(int bit) const;
     void modes_changed(int port);
+    void interrupts_selected();
     void check_em4(int port, int bit, bool level);
 };
 

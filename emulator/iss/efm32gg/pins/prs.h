@@ -11,6 +11,7 @@ namespace efm32gg {
 class Prs : public Peripheral {
 public:
     static constexpr int CHANNELS = 12;
+    static constexpr int PINS = 48;    // source: pins 0 to 7; 8 to 15 are the next
 
     using Peripheral::Peripheral;
 
@@ -52,6 +53,16 @@ public:
             signals[source] = (uint8_t)(signals[source] ^ 1 << signal);
         }
         signals[source] = (uint8_t)(signals[source] ^ 1 << signal);
+    }
+
+    // As `set` of each of these pins, while no channel selects any.
+    bool listens_to_pins() const { return selected >> PINS & 3; }
+    void note_pins(uint32_t pins, uint32_t levels) {
+        for (int half = 0; half < 2; half++) {
+            const uint8_t mask = (uint8_t)(pins >> 8 * half);
+            uint8_t &noted = signals[PINS + half];
+            noted = (uint8_t)((noted & ~mask) | (levels >> 8 * half & mask));
+        }
     }
 
     void pulse(int source, int signal) {

@@ -154,6 +154,22 @@ def test_pin_drives_another_pin_through_the_prs() -> None:
     assert pins(bench) == [(1, 1)]
 
 
+@pytest.mark.parametrize("pin", [3, 9])
+@pytest.mark.parametrize("port", [A, B])
+def test_prs_channel_finds_the_level_of_a_pin_that_changed_before(port: int, pin: int) -> None:
+    bench = Bench().clock("GPIO", "PRS")
+    bench["GPIO.PA_MODEL"] = bench["GPIO.PB_MODEL"] = INPUT << 12
+    bench["GPIO.PA_MODEH"] = bench["GPIO.PB_MODEH"] = INPUT << 4
+    bench["GPIO.EXTIPSELL" if pin < 8 else "GPIO.EXTIPSELH"] = B << 4 * (pin % 8)
+    for level in (1, 0, 1):
+        bench.machine.pin(port, pin, level)
+    bench["GPIO.PA_MODEL"] = PUSH_PULL << 4
+    bench["PRS.ROUTE"] = 2  # channel 1 on PA1
+    pins(bench)
+    bench["PRS.CH1_CTRL"] = pin % 8 | (48 + pin // 8) << 16
+    assert pins(bench) == ([(1, 1)] if port == B else [])
+
+
 def test_prs_software_pulse_reaches_the_pin() -> None:
     bench = Bench().clock("GPIO", "PRS")
     bench["PRS.ROUTE"] = 1
