@@ -24,11 +24,17 @@ from cubestack.host.studies.calibrate import CalibrateOptions
 from cubestack.host.studies.cubestar import upsets
 from cubestack.host.studies.cubestar.calibrate import EXPERIMENT
 from cubestack.host.studies.cubestar.celestial import celestial
-from cubestack.host.studies.cubestar.layouts import LayoutOptions, attitudes_of_loop, measure_layout
+from cubestack.host.studies.cubestar.layouts import (
+    LayoutOptions,
+    attitudes_of_loop,
+    measure_layout,
+    turns,
+)
 from cubestack.host.studies.cubestar.margins import margins
 from cubestack.host.studies.cubestar.night import night
 from cubestack.host.studies.cubestar.readings import READINGS, night_by, signs
 from cubestack.host.studies.cubestar.shots import PICTURES, Shot, field_shots, slewing_shots
+from cubestack.host.studies.cubestar.stars_alone import false_alarms, identification
 from cubestack.host.studies.cubestar.variants import VARIANTS
 from cubestack.host.studies.fidelity.table import Fidelity, read_tables
 from cubestack.host.studies.hazards.overview import skies
@@ -316,6 +322,9 @@ _TEXT = {
         100,
         seconds=30,
     ),
+    "turns": Trial(turns, 10, 3, 2),
+    "identification": Trial(identification, 2000, 20, 20, profiles=False),
+    "false alarms": Trial(false_alarms, 3000, 60, 12, profiles=False),
     "margins": Trial(margins, 200, 5, 20, profiles=False),
     "upsets": Trial(partial(upset_figures, experiment=upsets.EXPERIMENT), 8, 0, 90, profiles=False),
     "skies": skies("cubestar", {"bright": {"mag_limit": 3.8}, **_FALSE, **_FOCAL}),

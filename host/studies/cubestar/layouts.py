@@ -204,4 +204,37 @@ def attitudes_of_loop(board: CubeStarBoard, seconds: int) -> Iterator[Found]:
         )
 
 
+SLOWER = 6
+"""Register of a frame rate at which two images per second are too many."""
+
+
+def turns(opened: CubeStarOpener, seconds: int) -> dict[str, float]:
+    """Of the loop with two memories: its frames in ms, how long the camera is on in %, its rate
+    with a slower camera, and whether it then reports an error; transactions of the shared memory
+    while stars are found in Orion."""
+    with opened(None, seed=0, layout=Layout.TWO_MEMORIES.value) as emulated:
+        client = emulated.client.client
+        client.command("Trigger")
+        begun, *found = attitudes_of_loop(emulated.board, seconds)
+        phases = emulated.client.phase_times()
+        figures = {name: phases[name] for name in ("discard", "capture")}
+        figures["camera"] = sum(figures.values()) * _rate_hz(begun, found) / 10
+        client.command("SetFrameRate", FrameRate=SLOWER)
+        begun, *found = attitudes_of_loop(emulated.board, seconds)
+        phases = emulated.client.phase_times()
+        figures["slower"] = phases["discard"] + phases["capture"]
+        figures["slower hz"] = _rate_hz(begun, found)
+        figures["slower late"] = bool(client.telemetry("ErrorFlags")["TimingError"])
+    with opened(None, seed=0, layout=Layout.SHARED.value) as emulated:
+        before = emulated.board.processor.meter.counts.copy()
+        emulated.client.capture_and_process()
+        spent = emulated.board.processor.meter.counts - before
+        figures |= {name: spent[f"ebi_{name[:-1]}"] for name in ("reads", "writes")}
+    return figures
+
+
+def _rate_hz(begun: Found, found: Sequence[Found]) -> float:
+    return len(found) * PS_PER_S / (found[-1].time_ps - begun.time_ps)
+
+
 EXPERIMENT = _Layouts()

@@ -57,7 +57,6 @@ ELSEWHERE: dict[tuple[str, str], str] = {
     ("how-to/fpga-board.md", "built with"): "of a placer that is not installed with the project",
     ("how-to/profiles.md", " | CubeStar"): DECLARED,
     ("identification.md", " | lens"): "tests/host/studies/test_lens_errors.py compares",
-    ("identification.md", " | ours"): "with another program, of one version",
     ("layouts.md", "phase | cycles"): DECLARED,
     ("mutants.md", "Top | Possible"): LONG,
     ("mutants.md", "Tests | Killed"): LONG,
