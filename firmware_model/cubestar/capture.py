@@ -16,6 +16,7 @@ from cubestack.firmware_model.interface.cubestar.codes import TaskStatus
 from cubestack.firmware_model.mcu.requests import AwaitPin, ReadTimer, Routine, Sleep
 
 ACK_POLL_CYCLES = 8  #: port read (3) and loop step (5) of the cost table
+LATE_US = 1  #: an ACK seen by the first poll rose before
 ACK_TIMEOUT_US = 2_000_000  #: more than two frames at the lowest frame rate; assumed
 
 
@@ -61,6 +62,7 @@ class ImageCapture:
         """An upload or test pattern replaced the image; returns False if its supply was cut."""
         now_us: int = yield ReadTimer()
         self.state.retained.image_ms = now_us // 1000
+        self.state.earlier.note_time(None)
         self.state.retained.image_present = int(not self.supply.cut)
         self.state.retained.frame += 1
         return not self.supply.cut
@@ -90,12 +92,17 @@ class ImageCapture:
         self.supply.sample()
         if meanwhile is not None:
             yield from meanwhile
+        awaiting_us: int = yield ReadTimer()
         pin = self.memory.acknowledge
         stored: bool = yield AwaitPin(pin, 1, ACK_TIMEOUT_US, ACK_POLL_CYCLES)
+        acknowledged_us: int = yield ReadTimer()
         yield from self.memory.end(stored)
         yield from phases.end(self.state, "capture_us", started_us)
         ended_us: int = yield ReadTimer()
-        self.state.retained.image_ms = (ended_us - self.sensor.age_at_frame_end_us()) // 1000
+        age_us = self.sensor.age_at_frame_end_us()
+        self.state.retained.image_ms = (ended_us - age_us) // 1000
+        seen = acknowledged_us > awaiting_us + LATE_US
+        self.state.earlier.note_time(acknowledged_us - age_us if seen else None)
         if not (yield from self.sensor.enable(False)):
             self.state.raise_flag("ISDisableError")  # the image is valid nevertheless
             self.sensor.forget_set_up()

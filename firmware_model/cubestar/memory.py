@@ -9,6 +9,7 @@ not modelled, so flash and RAM must leave room for it.
 
 import numpy as np
 
+from cubestack.firmware_model.cubestar import earlier_stars
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.cubestar.detection.background_search import (
     MOST_AREAS,
@@ -16,6 +17,7 @@ from cubestack.firmware_model.cubestar.detection.background_search import (
     MOST_STARS_FACTOR,
 )
 from cubestack.firmware_model.cubestar.detection.spots import HALF
+from cubestack.firmware_model.cubestar.earlier_stars import EarlierStars
 from cubestack.firmware_model.cubestar.link import SEND_BUFFER_BYTES
 from cubestack.firmware_model.cubestar.matching.pair_triangles import MOST_PAIRS
 from cubestack.firmware_model.cubestar.matching.voting import CUT_RADIUS_DEG
@@ -28,6 +30,7 @@ from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.memory import Buffer, Memory
 from cubestack.firmware_model.node.commands import QUEUE_DEPTH
 from cubestack.firmware_model.node.link import longest_command
+from cubestack.firmware_model.star_tracker import gyro
 from cubestack.firmware_model.star_tracker.background import CELL
 
 KB = 1024
@@ -68,6 +71,7 @@ def budget(catalogue: StarCatalogue) -> tuple[Buffer, ...]:
     noise = _limit("setDetectionVariables", "MaxNoise") + 1
     visited = (stars + invalid) * pixels + noise * (pixels - 1)
     listed = len(catalogue)
+    kept = EarlierStars.LAYOUT.size
     longest_answer = max(message.length for message in INTERFACE.telemetries)
     ram = {
         # centroid, undistorted point, camera vector; size, intensity, identity, votes
@@ -88,6 +92,10 @@ def budget(catalogue: StarCatalogue) -> tuple[Buffer, ...]:
         * (longest_command(INTERFACE) + 1),
         "I2C answer": longest_answer,
         "UART send buffer": SEND_BUFFER_BYTES,
+        # vectors and times before and now, pairs, their votes
+        "stellar gyro": 4 * (3 + 1) * earlier_stars.MOST_STARS
+        + 4 * MOST_STARS * MOST_STARS_FACTOR
+        + (2 + 1) * gyro.MOST_PAIRS,
         "settings, flags and counters": State.RETENTION_SIZE,
         "stack": STACK_BYTES,
     }
@@ -101,7 +109,8 @@ def budget(catalogue: StarCatalogue) -> tuple[Buffer, ...]:
             Buffer(f"page {page}", Memory.FLASH, FLASH_PAGE_BYTES)
             for page in (CONFIG_PAGE, ATTITUDE_PAGE, MODE_PAGE)
         ),
-        Buffer("settings, flags and counters", Memory.RETENTION, State.RETENTION_SIZE),
+        Buffer("settings, flags and counters", Memory.RETENTION, State.RETENTION_SIZE - kept),
+        Buffer("stars of the image before", Memory.RETENTION, kept),
     )
 
 

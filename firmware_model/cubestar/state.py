@@ -18,6 +18,7 @@ from io import BytesIO
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.firmware_model.cubestar.earlier_stars import EarlierStars
 from cubestack.firmware_model.cubestar.hardware import CubeStarHardware
 from cubestack.firmware_model.interface.codec import attitude_quality, switch_messages
 from cubestack.firmware_model.interface.codec.field import Value
@@ -156,6 +157,7 @@ class State(NodeState):
         + _COUNTERS.size
         + _QUALITY.length
         + Attitude.LAYOUT.size
+        + EarlierStars.LAYOUT.size
     )
 
     def __init__(
@@ -179,6 +181,7 @@ class State(NodeState):
         self.quality = dict(UNRATED)  #: of the latest image, values of telemetry Quality
         #: an attitude that contradicts the last believed one and needs confirmation
         self.candidate: Attitude | None = None
+        self.earlier = EarlierStars()  #: of the image before; in use with switch ``gyro``
         self.task_status = TaskStatus.POWERING_UP  #: value of telemetry TaskStatus
         self.reset_cause = ResetCause.UNDETERMINED  #: why the program started
         self.startup_us = 0  #: time from the reset to the main loop
@@ -192,8 +195,9 @@ class State(NodeState):
             self.flags = {name for name, raised in flags.items() if raised}
             self.retained = Retained(*self._COUNTERS.unpack(data.read(self._COUNTERS.size)))
             self.quality = _QUALITY.unpack(data.read(_QUALITY.length))
-            candidate = Attitude.unpack(data.read())
+            candidate = Attitude.unpack(data.read(Attitude.LAYOUT.size))
             self.candidate = candidate if candidate.matched else None
+            self.earlier = EarlierStars.unpack(data.read())
         else:
             self.load_config()
 
@@ -213,12 +217,14 @@ class State(NodeState):
             + self._COUNTERS.pack(*counters)
             + _QUALITY.pack(**self.quality)
             + (bytes(Attitude.LAYOUT.size) if candidate is None else candidate.pack())
+            + self.earlier.pack()
         )
 
     def forget(self) -> None:
         """Return to the values after power-up; supplies that were cut must still be restored."""
         self.retained = Retained(cut=self.retained.cut)
         self.quality, self.candidate = dict(UNRATED), None
+        self.earlier = EarlierStars()
         self.flags.clear()
         self.switches.forget()
         self.load_config()

@@ -22,6 +22,7 @@ KEYS = {
     "solved", "right", "centroids", "matched", "wrong", "mode", "error_cross_deg",
     "error_roll_deg", "truth", "quaternion", "phase_ms", "wall_ms", "status", "threshold",
     "searched", "profile", "reason", "false_alarm", "sigma_deg", "error_deg",
+    "rate_deg_s", "rate_sigma_deg_s", "rate_error_deg_s",
 }  # fmt: skip
 PHASES = {"idle", "discard", "capture", "transfer", "detect", "match", "attitude"}
 
@@ -160,3 +161,14 @@ def test_streaks_are_not_tracked(profile: str, rate: float) -> None:
     taken = _turning(profile, 6, rate)
     assert not any(shot.tracked for shot in taken)
     assert sum(shot.right for shot in taken) <= (2 if rate < 8 else 0)
+
+
+def test_stellar_gyro_measures_the_rate_of_a_turning_sky(measure: Measure) -> None:
+    gyro = ("--set", "gyro=on", "--mag-limit", 3.8, "--frames", 3, "--seed", 4)
+    for frame in measure(*gyro, "--turning", 0.3):
+        assert np.linalg.norm(frame["rate_deg_s"]) == pytest.approx(0.3, abs=0.03)
+        assert np.abs(frame["rate_error_deg_s"]) == pytest.approx([0, 0, 0], abs=0.03)
+        assert np.abs(frame["rate_error_deg_s"][:2]) == pytest.approx([0, 0], abs=0.008)
+        assert 0 < frame["rate_sigma_deg_s"][0] < 0.01
+    (off, *_) = measure("--mag-limit", 3.8, "--turning", 0.3)
+    assert off["rate_deg_s"] is None

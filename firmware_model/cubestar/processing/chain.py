@@ -18,6 +18,7 @@ from cubestack.firmware_model.cubestar.detection import SearchEnd
 from cubestack.firmware_model.cubestar.matching.identification import Identification
 from cubestack.firmware_model.cubestar.processing import estimate
 from cubestack.firmware_model.cubestar.processing.estimate import Estimate, by_errors, by_votes
+from cubestack.firmware_model.cubestar.processing.gyro import measure_rate
 from cubestack.firmware_model.cubestar.processing.identify import (
     FEWEST_STARS,
     OUTCOME_FLAGS,
@@ -138,6 +139,9 @@ class Processing:
         self.results = Results(
             detection, points, vectors, frame=retained.frame, image_ms=retained.image_ms
         )
+        if self._switches.gyro == "on":
+            with self._cycles(), self.meter.phase("gyro"):
+                self.results.rate = measure_rate(self.state, self.results, self.meter)
         found = len(vectors) > 0
         if not found:
             self._report_outcome(MatchOutcome.TOO_FEW_CENTROIDS)

@@ -88,7 +88,10 @@ def by_errors(
     stars support. Raises AttitudeError."""
     kept, detection = identification.matched, results.detection
     scale = identification.scale if abs(identification.scale - 1) > SCALED else 1.0
-    inertial, sigmas = vectors[identification.stars[kept]], _sigmas(results, kept, camera, meter)
+    inertial, sigmas = (
+        vectors[identification.stars[kept]],
+        expected_errors(results, kept, camera, meter),
+    )
     fit = robust_fit(results.vectors[kept], inertial, sigmas, meter, scale=scale, excess=EXCESS)
     meter.charge(flash_read=3 * len(kept))
     refused = False
@@ -110,12 +113,18 @@ def by_errors(
     return Estimate(fit.quaternion, len(kept), rating, refused)
 
 
-def _sigmas(
-    results: Results, kept: NDArray[np.intp], camera: CameraParameters, meter: Meter
+def expected_errors(
+    results: Results,
+    kept: NDArray[np.intp],
+    camera: CameraParameters,
+    meter: Meter,
+    *,
+    unknown_px: float = CENTROID_ERROR_PX,
 ) -> NDArray[np.float32]:
-    """Expected error (k,) of each star's direction in each axis, in rad."""
+    """Expected error (k,) of each star's direction in each axis, in rad; ``unknown_px`` is that of
+    a search without error estimates."""
     count = len(kept)
-    errors = np.full(count, CENTROID_ERROR_PX, np.float32)
+    errors = np.full(count, unknown_px, np.float32)
     if results.detection is not None and len(results.detection.errors_px):
         errors = results.detection.errors_px[kept]
     pixel_rad = np.float32(camera.pitch_mm) / np.float32(camera.focal_length_mm)

@@ -16,6 +16,7 @@ from cubestack.firmware_model.cubestar.matching.identification import Identifica
 from cubestack.firmware_model.cubestar.matching.tracking import track
 from cubestack.firmware_model.cubestar.matching.voting import CUT_RADIUS_DEG
 from cubestack.firmware_model.cubestar.state import Attitude, State
+from cubestack.firmware_model.interface.codec.field import Value
 from cubestack.firmware_model.interface.cubestar.codes import MatchMode
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.star_tracker.search import MatchOutcome
@@ -50,6 +51,8 @@ class Results:
     #: number and time of the picture, as in ``Attitude``
     frame: int = 0
     image_ms: int = 0
+    #: values of telemetry StellarGyro; None until it ran
+    rate: dict[str, Value] | None = None
 
 
 class Searches:

@@ -137,3 +137,15 @@ class Reason(IntEnum):
     NO_TIME = 11
     CONTRADICTION = 12
     LENS = 13  #: the stars do not fit the lens as described
+
+
+class RateOutcome(IntEnum):
+    """Why the latest image has no body rate, or MEASURED; telemetry StellarGyro."""
+
+    NOT_RUN = 0  #: switch gyro is off, or no image was processed
+    MEASURED = 1
+    NO_EARLIER_IMAGE = 2  #: the first image, or the same one again
+    TOO_FAR_APART = 3
+    UNTIMED = 4  #: uploaded, or its storing ended unseen while another image was processed
+    TOO_FEW_STARS = 5
+    UNMATCHED = 6

@@ -19,7 +19,7 @@ from cubestack.firmware_model.interface.codec.field import (
 )
 from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.interface.codec.switch_messages import switch_messages
-from cubestack.firmware_model.interface.cubestar.codes import MatchMode, Reason
+from cubestack.firmware_model.interface.cubestar.codes import MatchMode, RateOutcome, Reason
 from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitches
 from cubestack.firmware_model.interface.cubestar.telecommands import IMAGE_BYTES
 
@@ -142,6 +142,20 @@ _TELEMETRY = (
         u16("Spikes", "single bright pixels: hot ones, particles"),
         u16("Elongated", "areas elongated to streaks"),
         bool1("Valid", "the latest image has an attitude, which this frame rates"),
+    ),
+    Message(210, "StellarGyro", "body rate between the two latest images, from their stars").of(
+        u32("FrameCounter", "number of the later image since power-up", counter=True),
+        enum8("Outcome", "why there is no rate, or MEASURED", choices=RateOutcome),
+        *(
+            f32(f"Rate{axis}", f"rate about the camera's {axis.lower()} axis", "rad/s")
+            for axis in "XYZ"
+        ),
+        *(f32(f"Sigma{axis}", f"standard deviation of Rate{axis}", "rad/s") for axis in "XYZ"),
+        u32("Interval", "time between the two exposures, by the processor's timer", "us"),
+        u8("Compared", "stars of the earlier image that were looked for"),
+        u8("Matched", "stars found again"),
+        f32("Residual", "root mean square of their residuals in each axis", "rad"),
+        f32("LogFalseAlarm", "decimal logarithm of the probability of such a match by chance"),
     ),
 )
 

@@ -115,6 +115,14 @@ class CubeStarSwitches(Switches):
         "each grey value the same number of pixels; both are assumed",
         hardware=True,
     )
+    gyro: str = switch(
+        "body rate from the stars of two successive images, telemetry StellarGyro",
+        "off",
+        "off",
+        "on",
+        source="section 7.2 proposes it for a later version",
+        reason="on works without identification, with few stars and with stars of no catalogue",
+    )
 
 
 DEFAULT_SWITCHES = CubeStarSwitches()

@@ -16,6 +16,7 @@ from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
 from cubestack.firmware_model.interface.cubestar import (
     ImageBlockSize,
     MatchMode,
+    RateOutcome,
     Reason,
     TaskStatus,
 )
@@ -73,6 +74,22 @@ class Quality(AttitudeQuality):
     background_range_dn: float  #: range of the sky's brightness over the image
     saturated: float  #: share of saturated pixels, 0 to 1
     elongated: int  #: areas elongated to streaks
+
+
+@dataclass(frozen=True)
+class BodyRate:
+    """Rate between the two latest images, from their stars (switch ``gyro``)."""
+
+    outcome: RateOutcome  #: why there is no rate, or MEASURED
+    rate_rad_s: NDArray[np.float64]  #: (3,) about the camera's axes; zeros without a rate
+    sigmas_rad_s: NDArray[np.float64]  #: (3,) standard deviations that the node claims
+    matched: int  #: stars in both images
+    interval_s: float  #: time between the two exposures, by the node's timer
+    frame: int  #: number of the later image since power-up
+
+    @property
+    def valid(self) -> bool:
+        return self.outcome is RateOutcome.MEASURED
 
 
 @dataclass(frozen=True)
@@ -216,6 +233,18 @@ class CubeStar(DeviceClient):
             background_range_dn=float(values["BackgroundRange"]),
             saturated=float(values["Saturated"]),
             elongated=int(values["Elongated"]),
+        )
+
+    def body_rate(self) -> BodyRate:
+        """The stellar gyro's result; a software reset of the loop discards it."""
+        values = self.client.telemetry("StellarGyro")
+        return BodyRate(
+            outcome=RateOutcome(int(values["Outcome"])),
+            rate_rad_s=np.array([float(values[f"Rate{axis}"]) for axis in "XYZ"]),
+            sigmas_rad_s=np.array([float(values[f"Sigma{axis}"]) for axis in "XYZ"]),
+            matched=int(values["Matched"]),
+            interval_s=int(values["Interval"]) / 1e6,
+            frame=int(values["FrameCounter"]),
         )
 
     def latest(self) -> Columns:

@@ -18,11 +18,12 @@ examples:
   cubestack measure cubestar --mode assisted --hint-error 5   rough boresight
   cubestack measure cubestar --image sky.jpg --crop 0,256 --camera camera.json
   cubestack measure cubestar --mag-limit 3.8 --layout 2       one SRAM for FPGA and processor
+  cubestack measure cubestar --profile extended --set gyro=on --turning 0.3    the body rate too
 """
 
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -31,6 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.emulator.boards.cubestar.board import CubeStarBoard
+from cubestack.emulator.camera.common.view import SkyView
 from cubestack.emulator.camera.mlx75412.lens import CONDITION
 from cubestack.emulator.scene.sky import PictureScene, SkyScene
 from cubestack.firmware_model.formats.untrusted import read_json
@@ -66,6 +68,9 @@ SKIES = 5
 
 START_S = 0.02
 """Start-up time in s of own firmware, which ignores its ports until then."""
+
+APART_S = 1.0
+"""Time in s between two images of a sky, for the stellar gyro."""
 
 EXPOSED_S = 0.3
 """Approximate time in s from command to exposure; it matters only for fast motion."""
@@ -103,6 +108,7 @@ class CubeStarOptions(attitudes.SkyOptions):
         "and --faults)",
         metavar="DN",
     )
+    turning: float = number(0.0, "body rate about a random axis", 0, 10, "deg/s")
     crop: tuple[int, int] = corner((0, 0), "with --image: left upper corner of the 1024 x 512 part")
     camera: Path | None = path_option(
         None, "with --image: JSON with the camera's f_px, cx_px, cy_px, k1, k2, p1, p2"
@@ -113,10 +119,13 @@ class CubeStarOptions(attitudes.SkyOptions):
         if self.image is None and self.given("camera", "crop"):
             raise ValueError("--crop and --camera belong to --image")
         hazards.check(self.hazard)
-        if not self.is_random and self.given("mag_limit", "false_stars", "no_noise", "hazard"):
+        if not self.is_random and self.given(
+            "mag_limit", "false_stars", "no_noise", "hazard", "turning"
+        ):
             raise ValueError(
-                "--mag-limit, --false-stars, --no-noise and --hazard belong to the random sky; a "
-                "scene file has the keys mag_limit, false_stars, noise and hazards"
+                "--mag-limit, --false-stars, --no-noise, --hazard and --turning belong to the "
+                "random sky; a scene file has the keys mag_limit, false_stars, noise, hazards and "
+                "rate_deg_s"
             )
 
     @property
@@ -134,6 +143,11 @@ class CubeStarResult(attitudes.AttitudeResult):
 
     threshold: int  #: of detection, in DN
     searched: bool  #: whether it was searched first, with some skies or the image
+    #: rate_deg_s, rate_sigma_deg_s, rate_error_deg_s: body rate of switch gyro about the camera's
+    #: axes, claimed standard deviations and errors; None without
+    rate_deg_s: list[float] | None = None
+    rate_sigma_deg_s: list[float] | None = None
+    rate_error_deg_s: list[float] | None = None
 
 
 class _Experiment(attitudes.AttitudeExperiment["CubeStarOpener", CubeStarOptions, CubeStarResult]):
@@ -156,21 +170,23 @@ class _Experiment(attitudes.AttitudeExperiment["CubeStarOpener", CubeStarOptions
             scene = PictureScene(options.image, crop=options.crop)
             picture_truth = _picture_truth(options.image, options.camera)
         elif options.is_random:
-            scene = attitudes.random_view(options, CONDITION, rng)
+            scene = _view(options, rng)
         with opened(scene, seed=options.seed, faults=options.faults) as emulated:
             wait_started(emulated)
             if camera is not None:
                 emulated.client.configure(calibrate(camera).settings)
             searches = options.searches and not _adapts(opened)
+            gyro = _has_gyro(opened) and options.mode == "lis"
             threshold = _threshold(emulated, options, searches)
             for number in range(options.frames):
                 if number and options.is_random:
-                    emulated.scene = attitudes.random_view(
-                        options, CONDITION, rng, emulated.time_s + EXPOSED_S
-                    )
-                yield _measure(
+                    emulated.scene = _view(options, rng, emulated.time_s + EXPOSED_S)
+                if options.is_random and gyro:
+                    _earlier_image(emulated)
+                found = _measure(
                     emulated, options, picture_truth, rng, threshold, searches, opened.rates
                 )
+                yield replace(found, **_rate(emulated)) if gyro else found
 
     def summarise(self, results: Sequence[CubeStarResult], wall_s: float) -> Iterator[str]:
         if any(result.searched for result in results):
@@ -179,6 +195,13 @@ class _Experiment(attitudes.AttitudeExperiment["CubeStarOpener", CubeStarOptions
                 "--threshold DN sets one"
             )
         yield from super().summarise(results, wall_s)
+        rates = np.array([r.rate_error_deg_s for r in results if r.rate_error_deg_s is not None])
+        if len(rates):
+            x, y, z = 3600 * np.sqrt(np.mean(rates**2, axis=0))
+            yield (
+                f"body rate in {len(rates)} of {len(results)}; root mean square error {x:.1f} and "
+                f"{y:.1f} arcsec/s across, {z:.1f} about the boresight"
+            )
 
     def advice(self, results: Sequence[CubeStarResult]) -> str:
         stars, threshold = np.median([result.centroids for result in results]), results[0].threshold
@@ -211,6 +234,44 @@ def _adapts(opened: CubeStarOpener) -> bool:
     return opened.rates and bool(switches.detection == "background")
 
 
+def _has_gyro(opened: CubeStarOpener) -> bool:
+    switches: Any = opened.switches
+    return not opened.board.get("firmware") and bool(switches.gyro == "on")
+
+
+def _view(options: CubeStarOptions, rng: np.random.Generator, time_s: float = 0.0) -> SkyView:
+    """A random view that turns, if it shall; ``time_s``: approximate time of its exposure."""
+    more: dict[str, Any] = {}
+    if options.turning:
+        axis = rng.standard_normal(3)
+        more["rate_deg_s"] = tuple(options.turning * axis / np.linalg.norm(axis))
+    return attitudes.random_view(options, CONDITION, rng, time_s, **more)
+
+
+def _earlier_image(emulated: CubeStarEmulated) -> None:
+    """An image that the next one's rate can be measured against."""
+    due_s = emulated.time_s + APART_S
+    emulated.client.capture_and_process()
+    emulated.client.client.pause(max(0.0, due_s - emulated.time_s))
+
+
+def _rate(emulated: CubeStarEmulated) -> dict[str, Any]:
+    """Fields of the stellar gyro's result; the truth is the scene's present rate."""
+    rate, scene = emulated.client.body_rate(), emulated.scene
+    if not rate.valid:
+        return {}
+    known = isinstance(scene, SkyScene)
+    truth = scene.pose_at(emulated.board.kernel.now).rate_deg_s if known else None
+    measured = np.degrees(rate.rate_rad_s)
+    found: dict[str, Any] = {
+        "rate_deg_s": measured.tolist(),
+        "rate_sigma_deg_s": np.degrees(rate.sigmas_rad_s).tolist(),
+    }
+    if truth is not None:
+        found["rate_error_deg_s"] = (measured - np.asarray(truth, np.float64)).tolist()
+    return found
+
+
 def _views(emulated: CubeStarEmulated, options: CubeStarOptions) -> Iterator[None]:
     """Views for a threshold search: random skies, or the camera's scene."""
     if not options.is_random:
@@ -218,7 +279,7 @@ def _views(emulated: CubeStarEmulated, options: CubeStarOptions) -> Iterator[Non
         return
     scene, rng = emulated.scene, np.random.default_rng([options.seed, SKIES])
     for _ in range(SKIES):
-        emulated.scene = attitudes.random_view(options, CONDITION, rng)
+        emulated.scene = _view(options, rng)
         yield
     emulated.scene = scene
 

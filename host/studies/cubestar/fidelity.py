@@ -24,6 +24,7 @@ from cubestack.host.studies.calibrate import CalibrateOptions
 from cubestack.host.studies.cubestar import upsets
 from cubestack.host.studies.cubestar.calibrate import EXPERIMENT
 from cubestack.host.studies.cubestar.celestial import celestial
+from cubestack.host.studies.cubestar.gyro import GYRO
 from cubestack.host.studies.cubestar.layouts import (
     LayoutOptions,
     attitudes_of_loop,
@@ -348,6 +349,7 @@ FIDELITY = Fidelity(
         "noiseless-as-printed": _measured(100, mag_limit=3.8, no_noise=True, set=AS_PRINTED),
         "full-as-printed": _measured(60, mag_limit=4.5, set=AS_PRINTED),
         **VARIANTS,
+        **GYRO,
         "loop": Trial(_loop, 20, 2, 10),
         **{
             f"layout-{layout.value}": Trial(partial(_layout, layout=layout.value), 30, 2, 5)

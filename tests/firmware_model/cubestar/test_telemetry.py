@@ -27,6 +27,7 @@ SUPPORTED = [message.name for message in INTERFACE.telemetries if message.suppor
 ELSEWHERE = {
     "Profile": "test_effects",
     "Quality": "test_quality",
+    "StellarGyro": "test_gyro",
     **dict.fromkeys(
         ("StarPositions", "BodyUnitVectors", "IDStarsDetails", "InertialUnitVectors", "NumIdStars",
          "StarDetails", "HipparcosNumber", "DetectionSummary", "BestStarIndex", "Star1Details",

@@ -11,6 +11,7 @@ from cubestack.firmware_model.interface.cubestar import (
     INTERFACE,
     AckError,
     MatchMode,
+    RateOutcome,
     Reason,
     TaskStatus,
 )
@@ -92,6 +93,20 @@ def test_quality_returns_the_covariance(cubestar: CubeStar, node: Any) -> None:
     node.values["Quality"] |= {"CorrelationXZ": -1.5}
     with pytest.raises(BadAnswerError, match="correlations within 1"):
         cubestar.quality()
+
+
+def test_body_rate_returns_rates_sigmas_and_outcome(cubestar: CubeStar, node: Any) -> None:
+    node.values["StellarGyro"] = {
+        **{"FrameCounter": 7, "Outcome": RateOutcome.MEASURED, "Interval": 999_500, "Matched": 8},
+        **{"RateX": 0.001, "RateY": -0.002, "RateZ": 0.003},
+        **{"SigmaX": 1e-6, "SigmaY": 2e-6, "SigmaZ": 3e-6},
+    }
+    rate = cubestar.body_rate()
+    assert (rate.valid, rate.frame, rate.matched, rate.interval_s) == (True, 7, 8, 0.9995)
+    np.testing.assert_allclose(rate.rate_rad_s, [0.001, -0.002, 0.003], rtol=1e-6)
+    np.testing.assert_allclose(rate.sigmas_rad_s, [1e-6, 2e-6, 3e-6], rtol=1e-6)
+    node.values["StellarGyro"] = {"Outcome": RateOutcome.UNMATCHED}
+    assert not cubestar.body_rate().valid
 
 
 def test_download_image_reports_progress(cubestar: CubeStar, node: Any) -> None:
