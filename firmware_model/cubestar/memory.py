@@ -9,7 +9,6 @@ not modelled, so flash and RAM must leave room for it.
 
 import numpy as np
 
-from cubestack.firmware_model.cubestar import earlier_stars
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.cubestar.detection.background_search import (
     MOST_AREAS,
@@ -30,7 +29,6 @@ from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.memory import Buffer, Memory
 from cubestack.firmware_model.node.commands import QUEUE_DEPTH
 from cubestack.firmware_model.node.link import longest_command
-from cubestack.firmware_model.star_tracker import gyro
 from cubestack.firmware_model.star_tracker.background import CELL
 
 KB = 1024
@@ -82,6 +80,7 @@ def budget(catalogue: StarCatalogue) -> tuple[Buffer, ...]:
         **_background_search(),
         # angle; first entry and number of entries in the pair list
         "pairs of stars": pairs * (4 + 2 + 2),
+        # the stellar gyro, which runs before the identification, uses them for its pairs
         "votes": stars * listed * 2,
         # star, older centroid and its star, next of the same star
         "pairs with the newest star": MOST_PAIRS * (2 + 1 + 2 + 2),
@@ -92,10 +91,6 @@ def budget(catalogue: StarCatalogue) -> tuple[Buffer, ...]:
         * (longest_command(INTERFACE) + 1),
         "I2C answer": longest_answer,
         "UART send buffer": SEND_BUFFER_BYTES,
-        # vectors and times before and now, pairs, their votes
-        "stellar gyro": 4 * (3 + 1) * earlier_stars.MOST_STARS
-        + 4 * MOST_STARS * MOST_STARS_FACTOR
-        + (2 + 1) * gyro.MOST_PAIRS,
         "settings, flags and counters": State.RETENTION_SIZE,
         "stack": STACK_BYTES,
     }
