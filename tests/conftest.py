@@ -119,6 +119,8 @@ def chromium() -> Iterator[Any]:
         pytest.skip(f"playwright does not start: {tried.stderr.strip()}")
     with api.sync_playwright() as playwright:
         # Containers have no sandbox, and only our own pages are opened.
-        browser = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
+        words = ["--no-sandbox", "--process-per-site"]
+        browser = playwright.chromium.launch(executable_path=program, args=words)
+        browser.new_context()  # which pages share that need none of their own
         yield browser
         browser.close()

@@ -128,7 +128,7 @@ def measured(page: Any) -> Page:
 def test_page_memory_does_not_grow(chromium: Any, server: Any) -> None:
     address = server.stdout.readline().strip()
     message = told(address, 1)
-    with shown(chromium, address) as page:
+    with shown(chromium, address, alone=True) as page:
         page.context.add_init_script(FED)
         page.reload()
         page.wait_for_function("() => window.hear")

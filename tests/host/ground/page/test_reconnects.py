@@ -113,7 +113,7 @@ def test_two_pages_in_one_browser_are_independent(chromium: Any) -> None:
     with (
         station("emulated:cubesense") as one,
         station("emulated:cubesense") as other,
-        shown(chromium, one) as page,
+        shown(chromium, one, alone=True) as page,
     ):
         second = page.context.new_page()
         second.goto(other)
