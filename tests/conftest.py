@@ -13,6 +13,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from cubestack.firmware_model.interface.codec.switches import DEFAULT_PROFILE
+from tests import tiers
 
 settings.register_profile(
     "repeatable", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow]
@@ -63,9 +64,27 @@ def pytest_collection(session: pytest.Session) -> None:
             importlib.import_module(".".join(file.relative_to(root).with_suffix("").parts))
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    text = "days in which each slow test has one turn; 1 runs all of them"
+    parser.addoption("--days", type=int, default=1, help=text)
+
+
+def pytest_report_header(config: pytest.Config) -> str:
+    days = config.getoption("--days")
+    return f"slow tests: turn {tiers.DAY % days + 1} of {days}, TESTS_DAY={tiers.DAY}"
+
+
 @pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Tests that share a module fixture run in one process, so that it is made once."""
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leaves out slow tests of other days, and marks groups.
+
+    Tests that share a module fixture run in one process, so that it is made once.
+    """
+    slow = [item for item in items if item.get_closest_marker("slow")]
+    today = tiers.of_day([item.nodeid for item in slow], tiers.DAY, config.getoption("--days"))
+    others = {item for item, runs in zip(slow, today, strict=True) if not runs}
+    config.hook.pytest_deselected(items=[*others])
+    items[:] = [item for item in items if item not in others]
     for item in items:
         shared = getattr(item, "_fixtureinfo", None)
         found = shared.name2fixturedefs.values() if shared else ()

@@ -1,14 +1,18 @@
 """Which cases of a parametrised test are quick, which are slow, and which are today's."""
 
+import os
+from collections import Counter
 from collections.abc import Iterable
 from datetime import UTC, datetime
 from typing import Any
+from zlib import crc32
 
 import pytest
 
 PARAM = type(pytest.param())
 
-DAY = datetime.now(UTC).toordinal()
+DAY = int(os.environ.setdefault("TESTS_DAY", str(datetime.now(UTC).toordinal())))
+"""Number of the day since 1 January of the year 1; all processes of a run have the same."""
 
 
 def quick(cases: Iterable[Any], count: int) -> list[Any]:
@@ -34,6 +38,20 @@ def todays(turn: int, turns: int, cases: int) -> int:
     """
     first, end = turn * cases // turns, (turn + 1) * cases // turns
     return first + DAY % (end - first)
+
+
+def of_day(names: Iterable[str], day: int, days: int) -> list[bool]:
+    """Whether each test of ``names`` (its node's name) has its turn on the day numbered ``day``.
+
+    Each has one of ``days`` turns, and cases of one test have turns one after the other.
+    """
+    before = Counter[str]()
+    found = list[bool]()
+    for name in names:
+        test = name.partition("[")[0]
+        found.append((crc32(test.encode()) + before[test] - day) % days == 0)
+        before[test] += 1
+    return found
 
 
 def _slow(case: Any) -> Any:

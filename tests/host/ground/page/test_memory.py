@@ -15,8 +15,6 @@ from typing import Any, NamedTuple
 import pytest
 from websockets.sync.client import connect
 
-from tests.tiers import DAY
-
 from ..browser import shown
 from ..conftest import SOON_S
 
@@ -25,7 +23,7 @@ pytestmark = [pytest.mark.xdist_group("page hours"), pytest.mark.slow]
 TABS = 8
 FRAMES = ["AttitudeQuaternion", "TaskStatus", "PerformanceParameters"]
 
-END_S = (2 if DAY % 7 else 8) * 3600
+END_S = 8 * 3600
 BEGIN_S = 2880
 
 MOST_GROWTH = 1 << 20

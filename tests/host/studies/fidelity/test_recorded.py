@@ -2,7 +2,6 @@
 
 import random
 from dataclasses import replace
-from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
@@ -20,11 +19,9 @@ from cubestack.host.studies.fidelity.recorded import (
 from cubestack.host.studies.fidelity.table import Job, fidelity_of, perform
 from cubestack.host.studies.rows.record import load, save
 from tests.conftest import Run
+from tests.tiers import DAY
 
 DOCS = Path(__file__).parents[4] / "docs"
-
-DAY = datetime.now(UTC).toordinal()
-"""Selects the rows that are measured again today."""
 
 compiled = pytest.mark.skipif(find_compiler() is None, reason="needs the compiled FPGA")
 
@@ -63,14 +60,7 @@ def test_all_rows_together_take_at_most_twenty_minutes_on_two_cores() -> None:
 # --- measured again -------------------------------------------------------------------------------
 
 
-def by_cost(least_s: float, most_s: float) -> list[Job]:
-    """Jobs whose stored time is within these limits."""
-    return [
-        job
-        for device in BUILT_IN
-        for job in all_jobs(device)
-        if least_s <= load(record_file(DOCS, device))[job.key].seconds < most_s
-    ]
+JOBS = [job for device in BUILT_IN for job in all_jobs(device)]
 
 
 def check(job: Job) -> None:
@@ -80,18 +70,17 @@ def check(job: Job) -> None:
 
 @compiled
 def test_sample_of_short_rows_is_the_same_today() -> None:
-    short = by_cost(0, 1)
+    stored = {name: load(record_file(DOCS, name)) for name in BUILT_IN}
+    short = [job for job in JOBS if stored[job.device][job.key].seconds < 1]
     for job in random.Random(DAY).sample(short, min(4, len(short))):
         check(job)
 
 
 @compiled
 @pytest.mark.slow
-def test_todays_part_of_the_rows_is_the_same() -> None:
-    """A sixth of those below 20 s, and one of the others."""
-    longer = by_cost(20, 1e9)
-    for job in [*by_cost(0, 20)[DAY % 6 :: 6], *longer[DAY % max(len(longer), 1) :][:1]]:
-        check(job)
+@pytest.mark.parametrize("job", [pytest.param(job, id=f"{job.device} {job.key}") for job in JOBS])
+def test_row_is_the_same_again(job: Job) -> None:
+    check(job)
 
 
 # --- stale ----------------------------------------------------------------------------------------
