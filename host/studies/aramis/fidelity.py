@@ -25,12 +25,14 @@ from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.host.experiments.aramis.measure import AramisOpener, AramisResult
 from cubestack.host.experiments.measure import measure
 from cubestack.host.studies.aramis.printed import bounds, spikes
+from cubestack.host.studies.aramis.stars_alone import stars_alone
 from cubestack.host.studies.fidelity.table import Fidelity, read_tables
 from cubestack.host.studies.hazards.overview import skies
 from cubestack.host.studies.rows.estimate import average, rate
 from cubestack.host.studies.rows.trial import Figures, Trial, measured, measured_in_turn
 
 EPOCH = 2000.0  # of the thesis' catalogue
+FIELDS_DEG = (*range(5, 14), 15, 17, 18, 19, 21, 25, 30, 35, 40)
 LOOKUP_SEED = 1
 STARS = 6
 """Of a field: the main triangle and three pivots (section 5.7)."""
@@ -68,6 +70,17 @@ def _catalogue(_opened: AramisOpener, _frames: int) -> Figures:
         figures[f"{name}_triangles"] = len(database)
         figures[f"{name}_mb"] = len(database.pack()) / 1e6
     return {**figures, "picture": IMAGE_BYTES / 2**20}
+
+
+def _fields(_opened: AramisOpener, _frames: int) -> Figures:
+    """The database of each field of view."""
+    figures: dict[str, float] = {}
+    for field_deg in FIELDS_DEG:
+        database = onboard_database(field_deg)
+        figures[f"{field_deg} stars"] = len(database.numbers)
+        figures[f"{field_deg} triangles"] = len(database)
+        figures[f"{field_deg} bytes"] = sum(database.sizes.values())
+    return figures
 
 
 def _lookups(_opened: AramisOpener, frames: int) -> Figures:
@@ -193,6 +206,8 @@ _TEXT = {
         bit_flips=1e-6,
     ),
     "times": Trial(_times, 40, 2, 4),
+    "fields": Trial(_fields, seconds=15, profiles=False),
+    "stars alone": Trial(stars_alone, 1000, 20, 20, profiles=False),
     "skies": skies(
         "aramis",
         {"false5": {"false_stars": 5}, "false20": {"false_stars": 20, "false_mags": (0.0, 4.0)}},

@@ -8,9 +8,9 @@ from cubestack.firmware_model.aramis.hardware import FrameEnd
 from cubestack.firmware_model.aramis.state import State
 from cubestack.firmware_model.interface.aramis import Reason
 from cubestack.firmware_model.mcu.requests import CameraTransfer
+from cubestack.host.studies.aramis.sky import meter, project, within
 
 from .harness import Harness
-from .sky import meter, project, within
 
 ROW_US = 31.75
 

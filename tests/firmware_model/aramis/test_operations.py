@@ -12,9 +12,9 @@ from cubestack.firmware_model.aramis.matching.shutter import at_middle_row
 from cubestack.firmware_model.aramis.pipeline import PUBLISHED, VERIFIED, Configuration
 from cubestack.firmware_model.aramis.pipeline import solve as solve_picture
 from cubestack.firmware_model.aramis.solution import Solution
+from cubestack.host.studies.aramis.sky import FIELD, Light, database, meter, picture
 
 from ..operations import as_on_record
-from .sky import FIELD, Light, database, meter, picture
 from .test_pipeline import sky
 
 PICTURES = {

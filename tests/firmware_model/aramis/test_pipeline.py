@@ -17,8 +17,15 @@ from cubestack.firmware_model.aramis.pipeline import solve as solve_picture
 from cubestack.firmware_model.aramis.solution import Solution, StarList
 from cubestack.firmware_model.interface.aramis import MeasurementOutcome, Reason
 from cubestack.firmware_model.mcu.costs import Meter
-
-from .sky import FIELD, Light, Picture, database, errors_deg, meter, picture
+from cubestack.host.studies.aramis.sky import (
+    FIELD,
+    Light,
+    Picture,
+    database,
+    errors_deg,
+    meter,
+    picture,
+)
 
 SPOT_PX = 1.5
 

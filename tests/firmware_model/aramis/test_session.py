@@ -16,10 +16,10 @@ from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.mcu.requests import Routine, Sleep
 from cubestack.firmware_model.node.commands import QueuedCommand
+from cubestack.host.studies.aramis.sky import database
 
 from ..sessions import Step, as_recorded
 from .harness import Harness
-from .sky import database
 from .test_pipeline import sky
 
 FRAME_US = 33_000

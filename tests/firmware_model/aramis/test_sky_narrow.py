@@ -19,8 +19,7 @@ from cubestack.firmware_model.aramis.field import CameraField
 from cubestack.firmware_model.aramis.pipeline import PUBLISHED, VERIFIED, Configuration, solve
 from cubestack.firmware_model.aramis.solution import Solution
 from cubestack.firmware_model.interface.aramis import MeasurementOutcome
-
-from .sky import database, errors_deg, meter
+from cubestack.host.studies.aramis.sky import database, errors_deg, meter
 
 FOLDER = Path(__file__).parents[4] / "shared" / "data" / "sky_narrow"
 PICTURES = sorted(FOLDER.glob("*.png"))

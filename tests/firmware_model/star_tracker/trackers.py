@@ -15,8 +15,8 @@ from cubestack.firmware_model.cubestar.matching import confirmed as pairs
 from cubestack.firmware_model.interface.aramis import Reason
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.star_tracker.search import MatchOutcome
+from cubestack.host.studies.aramis import sky as aramis_sky
 
-from ..aramis import sky as aramis_sky
 from ..cubestar import sky as cubestar_sky
 
 Rays = NDArray[np.float32]

@@ -13,8 +13,7 @@ from cubestack.emulator.boards.aramis.catalogue import CatalogueParameters
 from cubestack.firmware_model.aramis.catalogue.database import HEADER, Database, DatabaseError
 from cubestack.firmware_model.aramis.catalogue.geodesic import NO_FACE, geodesic_sphere
 from cubestack.firmware_model.aramis.catalogue.kvector import KVector
-
-from ..sky import database, meter
+from cubestack.host.studies.aramis.sky import database, meter
 
 SMALL = CatalogueParameters(fov_deg=12, stars_per_field=4, mag_limit=4)
 

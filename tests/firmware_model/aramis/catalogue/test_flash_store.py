@@ -10,9 +10,9 @@ from cubestack.firmware_model.aramis.catalogue.hamming import decode, encode
 from cubestack.firmware_model.aramis.catalogue.ram_copy import Protection
 from cubestack.firmware_model.aramis.hardware import CATALOGUE_AT, SECTOR_BYTES
 from cubestack.firmware_model.interface.aramis import MOST_CATALOGUE_BYTES, CatalogueState
+from cubestack.host.studies.aramis.sky import database, meter
 
 from ..harness import Harness
-from ..sky import database, meter
 
 
 class Desk:

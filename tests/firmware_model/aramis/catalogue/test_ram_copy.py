@@ -16,8 +16,7 @@ from cubestack.firmware_model.aramis.catalogue.ram_copy import (
 )
 from cubestack.firmware_model.aramis.hardware import CATALOGUE_AT, UPLOAD_AT
 from cubestack.firmware_model.interface.aramis import MOST_CATALOGUE_BYTES
-
-from ..sky import meter
+from cubestack.host.studies.aramis.sky import meter
 
 LENGTH = 803  # the last word is not whole
 

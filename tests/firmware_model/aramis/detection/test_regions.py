@@ -16,8 +16,7 @@ from cubestack.firmware_model.aramis.detection.mask import (
 from cubestack.firmware_model.aramis.detection.regions import MOST_RUNS, find_regions, locate_stars
 from cubestack.firmware_model.aramis.field import CameraField
 from cubestack.firmware_model.aramis.solution import StarList
-
-from ..sky import meter
+from cubestack.host.studies.aramis.sky import meter
 
 TOUCHING = np.ones((3, 3))
 

@@ -17,8 +17,7 @@ from cubestack.firmware_model.aramis.matching.identification import identify
 from cubestack.firmware_model.aramis.pipeline import VERIFIED, detect_locally
 from cubestack.firmware_model.aramis.solution import StarList
 from cubestack.firmware_model.interface.aramis import MeasurementOutcome, Reason
-
-from ..sky import FIELD, database, meter, picture
+from cubestack.host.studies.aramis.sky import FIELD, database, meter, picture
 
 NOISE = 1.5
 Y, X = np.mgrid[: FIELD.rows, : FIELD.columns]

@@ -12,9 +12,8 @@ from cubestack.firmware_model.aramis.matching.identification import identify
 from cubestack.firmware_model.aramis.matching.ranges import triangles_within
 from cubestack.firmware_model.aramis.pipeline import PUBLISHED, VERIFIED, Configuration
 from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
+from cubestack.host.studies.aramis.sky import FIELD, Light, database, picture
 from tests.firmware_model.compiled import assert_equal_forms
-
-from ..sky import FIELD, Light, database, picture
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="needs a C++ compiler")
 

@@ -18,8 +18,16 @@ from cubestack.firmware_model.aramis.pipeline import VERIFIED
 from cubestack.firmware_model.aramis.solution import Profile, Solution, StarList
 from cubestack.firmware_model.attitude.quest import AttitudeError
 from cubestack.firmware_model.interface.aramis import MeasurementOutcome, Reason
-
-from ..sky import FIELD, Light, Picture, database, errors_deg, meter, picture, pictures
+from cubestack.host.studies.aramis.sky import (
+    FIELD,
+    Light,
+    Picture,
+    database,
+    errors_deg,
+    meter,
+    picture,
+    pictures,
+)
 
 PROFILE = VERIFIED.profile
 

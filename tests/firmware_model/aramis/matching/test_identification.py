@@ -1,9 +1,10 @@
 """From stars to attitudes: the published profile, and the one that verifies.
 
-`campaign` measures the same over a thousand attitudes.
+`host.studies.aramis.stars_alone` measures the same over a thousand attitudes.
 """
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,12 +22,25 @@ from cubestack.firmware_model.aramis.pipeline import PUBLISHED, VERIFIED
 from cubestack.firmware_model.aramis.solution import NONE, Profile, Solution, StarList
 from cubestack.firmware_model.attitude.quest import quest
 from cubestack.firmware_model.interface.aramis import MeasurementOutcome, Reason
-
-from ..campaign import COARSE, rates
-from ..sky import FIELD, Light, Picture, database, errors_deg, meter, pictures
+from cubestack.host.studies.aramis.sky import (
+    FIELD,
+    Light,
+    Picture,
+    database,
+    errors_deg,
+    meter,
+    pictures,
+)
+from cubestack.host.studies.aramis.stars_alone import COARSE, outcomes
 
 NOISY = replace(COARSE, noise_px=1.0)
 PROFILES = pytest.mark.parametrize("profile", [PUBLISHED.profile, VERIFIED.profile])
+
+
+def rates(poses: int, *args: Any, **how: Any) -> dict[str, float]:
+    """Shares of the poses."""
+    counts = outcomes(poses, *args, **how)
+    return {name: counts[name] / poses for name in ("right", "wrong", "far")}
 
 
 def named(stars: StarList, profile: Profile, hint: np.ndarray | None = None) -> Solution:

@@ -14,10 +14,9 @@ from cubestack.firmware_model.aramis.matching.identification import identify
 from cubestack.firmware_model.aramis.matching.triangles import Triangle, measure_triangle
 from cubestack.firmware_model.aramis.solution import NONE, StarList
 from cubestack.firmware_model.interface.aramis import Reason
+from cubestack.host.studies.aramis.sky import FIELD, Light, database, meter, pictures
+from cubestack.host.studies.aramis.stars_alone import LISTED, PRINTED
 from tests.tiers import quick
-
-from ..campaign import LISTED, PRINTED
-from ..sky import FIELD, Light, database, meter, pictures
 
 Array = NDArray[Any]
 

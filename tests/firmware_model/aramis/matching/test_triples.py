@@ -15,8 +15,7 @@ from cubestack.firmware_model.interface.aramis import Reason
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.star_tracker.observation import Observation
 from cubestack.firmware_model.star_tracker.search import Triangles
-
-from ..sky import FIELD, Light, Picture, database, meter, pictures
+from cubestack.host.studies.aramis.sky import FIELD, Light, Picture, database, meter, pictures
 
 Vectors = NDArray[np.float32]
 

@@ -34,6 +34,8 @@ def database(parameters: CatalogueParameters | None = None) -> Database:
 
 @dataclass(frozen=True)
 class Light:
+    """What a list has beside its stars."""
+
     noise_px: float = 0.1  #: standard deviation of a centroid in x and in y
     mag_noise: float = 0.1  #: standard deviation of a magnitude
     mag_limit: float = 6.0  #: fainter stars do not show
@@ -116,11 +118,6 @@ def errors_deg(quaternion: NDArray[np.float32], truth: Rotation) -> tuple[float,
 def is_right(solution: Solution, truth: Rotation) -> bool:
     cross, roll = errors_deg(solution.quaternion, truth)
     return cross < 0.1 and roll < 0.3
-
-
-def misnamed(solution: Solution, made: Picture, database: Database) -> int:
-    named = solution.stars != NONE
-    return int(np.sum(database.numbers[solution.stars[named]] != made.hip[named]))
 
 
 def in_published_sense(solution: Solution, made: Picture, database: Database) -> bool:
