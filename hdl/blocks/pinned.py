@@ -3,6 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Literal
 
 from amaranth.hdl import Module
 from amaranth.lib.wiring import Component, In, Out
@@ -12,17 +13,18 @@ from cubestack.firmware_model.interface.pins import Pin
 
 @dataclass(frozen=True)
 class Stride:
-    """Clocks that each store or read a byte: the n-th clock at the n-th of consecutive addresses.
+    """Clocks that all do the same: take a byte, and store it, read it or drop it.
 
     At each rising edge ``counter`` increments and ``data`` takes the value of ``source``. No other
     register changes. While no other input changes, the only outputs that change are those that show
-    ``counter`` and ``data``. The low bits of the memory address are ``counter``; the high bits
-    stay. An engine runs such clocks in one operation (docs/engines.md).
+    ``counter`` and ``data``. An engine runs such clocks in one operation (docs/engines.md).
     :mod:`cubestack.hdl.proofs.strides` proves that the design behaves so from every state with
     these levels.
 
     - When storing, ``data`` is on the memory's data lines and is written while the clock is low.
     - When reading, the memory presents the byte at its address on ``source`` all the time.
+    - In both cases the low bits of the memory address are ``counter``; the high bits stay.
+    - When dropping, the memory is not written, its data lines are not driven, its address stays.
     """
 
     name: str  #: unique in the design; lower-case letters and dashes
@@ -30,12 +32,13 @@ class Stride:
     levels: tuple[tuple[str, int], ...]  #: required levels of input pins
     #: required values of registers, by their paths in the design
     state: tuple[tuple[str, int], ...]
-    counter: str  #: register; the stride lasts while it is below ``last``
-    last: int  #: highest value of the counter
+    counter: str  #: register; the stride lasts while it is below ``last``; empty if none counts
+    last: int  #: highest value of the counter, 0 without one
     data: str  #: register of 8 bits
     source: str  #: input pin of 8 bits
     memory: str  #: prefix of the memory's pin names
-    stores: bool  #: True if the stride stores bytes, False if it reads them
+    access: Literal["store", "read", "drop"]
+    below: int = 256  #: the stride lasts while ``data`` is below this
 
 
 class PinnedComponent(Component):

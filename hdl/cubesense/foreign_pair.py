@@ -7,7 +7,7 @@ from amaranth.hdl import Instance, Module
 from amaranth.lib.wiring import In
 
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, ReadOut
-from cubestack.hdl.blocks.pinned import PinnedComponent, RtlilComponent
+from cubestack.hdl.blocks.pinned import PinnedComponent, RtlilComponent, Stride
 from cubestack.hdl.cubesense.dataflow import Side
 from cubestack.hdl.cubesense.pair import CubeSensePair
 
@@ -45,6 +45,10 @@ class ForeignPair(CubeSensePair, RtlilComponent):
     @property
     def title(self) -> str:
         return " and ".join(design.title for design in self._designs.values())
+
+    @property
+    def strides(self) -> tuple[Stride, ...]:
+        return ()  # nothing of a user's design is assumed
 
     def _fpga(self, side: Side) -> PinnedComponent:
         if side not in self._designs:

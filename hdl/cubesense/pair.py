@@ -9,8 +9,9 @@ from amaranth.hdl import Cat, Module, Value
 from cubestack.firmware_model.interface.cubesense import pins
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, ReadOut
 from cubestack.firmware_model.interface.pins import resized
-from cubestack.hdl.blocks.pinned import PinnedComponent, connect_ports
+from cubestack.hdl.blocks.pinned import PinnedComponent, Stride, connect_ports
 from cubestack.hdl.cubesense.dataflow import Side
+from cubestack.hdl.cubesense.strides import strides_of
 from cubestack.hdl.cubesense.top import CubeSenseFpga
 
 #: Ports that each FPGA has separately; in the pair their names have the prefix SUN_ or NAD_.
@@ -39,6 +40,10 @@ class CubeSensePair(PinnedComponent):
         super().__init__(
             resized(pins.pair_pins(mcu_addressing), SUN_SRAM_A=width, NAD_SRAM_A=width)
         )
+
+    @property
+    def strides(self) -> tuple[Stride, ...]:
+        return tuple(one for side in pins.PREFIXES for one in strides_of(side, self.read_out))
 
     def _fpga(self, side: Side) -> PinnedComponent:
         return CubeSenseFpga(side, self.read_out, self.mcu_addressing)

@@ -53,7 +53,7 @@ class CubeStarBoard(PinnedComponent):
             data="writer.data",
             source=pins.PIXDATA,
             memory=memory,
-            stores=True,
+            access="store",
         )
 
     def _add_writer(self, m: Module, storing: Value) -> FrameWriter:

@@ -49,7 +49,7 @@ class CubeStarTop(CubeStarBoard):
             data="reader.data",
             source="SRAM_D_I",
             memory="SRAM",
-            stores=False,
+            access="read",
         )
         return self._row_stored(), read
 

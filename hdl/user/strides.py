@@ -79,7 +79,7 @@ def _renamed(stride: Stride, registers: list[str]) -> Stride | None:
     try:
         return replace(
             stride,
-            counter=found(stride.counter),
+            counter=found(stride.counter) if stride.counter else "",
             data=found(stride.data),
             state=tuple((found(path), level) for path, level in stride.state),
         )
@@ -127,8 +127,8 @@ class _Harness(Component):
         values = [*self._outputs()]
         ports |= {f"o_REGISTER_{number}": one.value for number, one in enumerate(values)}
         m.submodules.design = Instance("design", **ports)
-        size = SimpleNamespace(stride=self._stride, members=self._members)
-        each_clock(m, SimpleNamespace(**signals, size=size, registers=values))
+        size = SimpleNamespace(members=self._members)
+        each_clock(m, SimpleNamespace(**signals, size=size, registers=values), self._stride)
         return m
 
     def _outputs(self) -> Iterator[Register]:

@@ -140,53 +140,68 @@ private:
         stream.next_edge();
     }
 
-    // Runs a stride of camera N, up to `until`, in one step. Leaves the row's last two clocks, so
-    // that an ordinary clock follows.
-    template <int N, class Model> void store_strides(Model &top, int64_t until) {
-        store_strides<N>(top, until, std::make_integer_sequence<int, STRIDE_COUNT>());
+    // Runs a stride of camera N, up to `until`, in one step. Leaves the last two clocks with the
+    // same syncs, so that an ordinary clock follows.
+    template <int N, class Model> void run_strides(Model &top, int64_t until) {
+        run_strides<N>(top, until, std::make_integer_sequence<int, STRIDE_COUNT>());
     }
     template <int N, class Model, int... K>
-    void store_strides(Model &top, int64_t until, std::integer_sequence<int, K...>) {
+    void run_strides(Model &top, int64_t until, std::integer_sequence<int, K...>) {
         (void)top, (void)until;
-        (store_stride<N, K>(top, until), ...);
+        (void)(... || run_stride<N, K>(top, until));
     }
-    template <int N, int K, class Model> void store_stride(Model &top, int64_t until) {
+    template <int N, int K, class Model> bool run_stride(Model &top, int64_t until) {
         if constexpr (Stride<K>::camera == N) {
             constexpr std::integral_constant<int, K> stride;
+            constexpr bool stores = Stride<K>::stores;
             Stream &stream = streams[N];
+            if (stream.inside() != Stride<K>::line || !stride_ready(stride, top))
+                return false;
             const Segment &segment = stream.segment;
+            const uint8_t *const next = stream.rest_of_row();
             Sram &sram = srams[Stride<K>::memory];
             const int64_t half = segment.half_numerator / segment.half_denominator;
-            if (!stride_ready(stride, top) || !sram.stores_at(stream.time(), half, 2 * half))
-                return;
+            if (stores && !(next && sram.stores_at(stream.time(), half, 2 * half)))
+                return false;
             const int64_t counter = stride_counter(stride, top);
             const int64_t edges = stream.times.last_within(until - segment.start) + 1 - stream.edge;
-            const int64_t clocks =
-                std::min({segment.active_columns - 1 - stream.column, Stride<K>::last - counter,
-                          edges / 2}) - 1;
+            int64_t clocks = std::min(stream.clocks_alike() - 1, edges / 2);
+            if (Stride<K>::last >= 0)
+                clocks = std::min(clocks, Stride<K>::last - counter);
+            clocks--;
+            // The last clock may take any byte, as no other one of the stride has it.
+            if (Stride<K>::below < 256 && next && clocks > 0)
+                clocks = std::min(clocks, first_from(next, clocks, Stride<K>::below) + 1);
             if (clocks < SHORTEST_STRIDE)
-                return;
-            const uint8_t *next =
-                stream.pixels + stream.row * segment.active_columns + stream.column;
+                return false;
             const int64_t end = stream.edge + 2 * clocks;
-            stream.go_to(end - 2);
-            const int64_t rose = stream.time();
-            stream.next_edge();
-            const int64_t fell = stream.time();
-            sram.store(next, clocks, rose, fell);
-            stride_to(stride, top, counter + clocks, next[clocks - 1]);
+            if constexpr (stores) {
+                stream.go_to(end - 2);
+                const int64_t rose = stream.time();
+                stream.next_edge();
+                const int64_t fell = stream.time();
+                sram.store(next, clocks, rose, fell);
+            }
+            stride_to(stride, top, counter + clocks, next ? next[clocks - 1] : 0);
             stream.go_to(end);
             put_sample<N>(top);
             clocks_at_once += clocks;
+            return true;
         }
+        return false;
+    }
+
+    // Number of bytes before the first one of at least `limit`.
+    static int64_t first_from(const uint8_t *bytes, int64_t count, int limit) {
+        return std::find_if(bytes, bytes + count, [=](uint8_t b) { return b >= limit; }) - bytes;
     }
 
     template <int N, class Model>
     __attribute__((flatten)) Outcome burst_of_one(Model &top, int64_t until, int64_t &reached) {
         const uint32_t before = acknowledges(top);
         while (!streams[N].over()) {
-            if (strides && streams[N].in_row())
-                store_strides<N>(top, until);
+            if (strides && streams[N].may_stride())
+                run_strides<N>(top, until);
             const int64_t time = streams[N].time();
             if (time > until) {
                 reached = until;

@@ -88,14 +88,24 @@ struct Stream {
 
     bool inside() const { return segment.rows && column < segment.active_columns; }
 
-    // Whether the next edge rises, and enough clocks for a stride follow in its row.
-    bool in_row() const {
-        return edge % 2 == 0 && pixels && inside() &&
-               segment.active_columns - column > SHORTEST_STRIDE + 2;
+    // Clocks that remain of the row, or of the pause after it; of a blank segment, all.
+    int64_t clocks_alike() const {
+        if (!segment.rows)
+            return segment.edges / 2 - edge / 2;
+        return (inside() ? segment.active_columns : segment.line_clocks) - column;
+    }
+
+    // Whether the next edge rises, and enough clocks for a stride follow with the same syncs.
+    bool may_stride() const { return edge % 2 == 0 && clocks_alike() > SHORTEST_STRIDE + 2; }
+
+    // The pixels from the one on the lines on; null if they are all 0.
+    const uint8_t *rest_of_row() const {
+        return inside() && pixels ? pixels + row * segment.active_columns + column : nullptr;
     }
 
     uint8_t pixel() const {
-        return inside() && pixels ? pixels[row * segment.active_columns + column] : 0;
+        const uint8_t *const rest = rest_of_row();
+        return rest ? *rest : 0;
     }
 
     // First edge after `time`.

@@ -18,19 +18,27 @@ def stride_table(wiring: Wiring) -> str:
     """C++ table of the strides, for all translations of the design.
 
     STRIDE_COUNT, and ``Stride<K>`` with the numbers of its camera (-1 for the data clock) and its
-    memory, and the last value of its counter.
+    memory, whether it stores, the level of the camera's line pin, the last value of its counter
+    (-1 without one), and the limit of its data.
     """
     strides = wiring.component.strides
     text = f"#define STRIDE_COUNT {len(strides)}\ntemplate <int K> struct Stride;\n"
-    clocks = [camera.clock for camera in wiring.cameras]
+    cameras = {camera.clock: number for number, camera in enumerate(wiring.cameras)}
+    lines = {camera.line for camera in wiring.cameras}
     memories = [memory["A"] for memory in wiring.memories]
     for number, stride in enumerate(strides):
-        camera = clocks.index(stride.clock) if stride.stores else -1
-        memory = memories.index(f"{stride.memory}_A")
-        constants = f"static constexpr int camera = {camera}, memory = {memory};"
+        constants = {
+            "camera": cameras.get(stride.clock, -1),
+            "memory": memories.index(f"{stride.memory}_A"),
+            "stores": int(stride.access == "store"),
+            "line": max((level for pin, level in stride.levels if pin in lines), default=0),
+            "last": stride.last if stride.counter else -1,
+            "below": stride.below,
+        }
+        listed = ", ".join(f"{name} = {value}" for name, value in constants.items())
         text += (
-            f"// {stride}\ntemplate <> struct Stride<{number}> {{ {constants} "
-            f"static constexpr int64_t last = {stride.last}; }};\n"
+            f"// {stride}\ntemplate <> struct Stride<{number}> "
+            f"{{ static constexpr int {listed}; }};\n"
         )
     return text
 
@@ -42,7 +50,8 @@ def stride_functions(
 
     - stride_ready(k, top): whether pins and registers have the stride's levels; false if the
       translation lacks one of them.
-    - stride_counter(k, top): the counter; stride_to(k, top, counter, data) sets the end state.
+    - stride_counter(k, top): the counter, 0 without one; stride_to(k, top, counter, data) sets the
+      end state.
     """
     found = {path_of(member): member for member in members}
     text = ""
@@ -69,8 +78,8 @@ def _functions(
     levels = {port(pin): level for pin, level in stride.levels if pin not in fixed}
     levels |= {found.get(path, ""): level for path, level in stride.state}
     contradicted = any(fixed.get(pin, level) != level for pin, level in stride.levels)
-    counter, data = (f"top.{found.get(path, '')}" for path in (stride.counter, stride.data))
-    needed = {*levels, found.get(stride.counter, ""), found.get(stride.data, "")}
+    changed = {path: found.get(path, "") for path in (stride.counter, stride.data) if path}
+    needed = {*levels, *changed.values()}
     take = f"({tag}, const {namespace}::p_top &top)"
     if contradicted or not needed <= {*members}:
         return (
@@ -78,17 +87,24 @@ def _functions(
             f"inline int64_t stride_counter{take} {{ (void)top; return 0; }}\n"
             f"inline void stride_to({tag}, {namespace}::p_top &, int64_t, uint8_t) {{}}\n"
         )
-    conditions = (
+    conditions = [
         f"top.{name}{'.curr' if members[name].startswith('wire') else ''}"
         f".template get<uint32_t>() == {level}u"
         for name, level in levels.items()
-    )
+    ]
+    data, counter = f"top.{changed[stride.data]}", f"top.{changed.get(stride.counter, '')}"
+    conditions.append(f"{data}.curr.template get<uint32_t>() < {stride.below}u")
+    counted, count = "0", ""
+    if stride.counter:
+        counted = f"{counter}.curr.template get<uint32_t>()"
+        count = (
+            f"{counter}.curr.template set<uint32_t>((uint32_t)counter);\n"
+            f"{counter}.next = {counter}.curr;\n"
+        )
     return (
         f"inline bool stride_ready{take} {{ return {' && '.join(conditions)}; }}\n"
-        f"inline int64_t stride_counter{take} "
-        f"{{ return {counter}.curr.template get<uint32_t>(); }}\n"
+        f"inline int64_t stride_counter{take} {{ (void)top; return {counted}; }}\n"
         f"inline void stride_to({tag}, {namespace}::p_top &top, int64_t counter, uint8_t data) {{\n"
-        f"{counter}.curr.template set<uint32_t>((uint32_t)counter);\n"
-        f"{counter}.next = {counter}.curr;\n"
+        f"(void)counter;\n{count}"
         f"{data}.curr.template set<uint8_t>(data); {data}.next = {data}.curr;\n}}\n"
     )

@@ -13,10 +13,11 @@ from cubestack.hdl.cubesense.dataflow import SIDES, Side
 from cubestack.hdl.cubesense.pair import CubeSensePair
 from cubestack.hdl.proofs import properties
 from cubestack.hdl.proofs.cubesense import pins
-from cubestack.hdl.proofs.cubesense.designs import column_row, fpga, proof_design
+from cubestack.hdl.proofs.cubesense.designs import DesignMaker, column_row, fpga, proof_design
 from cubestack.hdl.proofs.cubesense.edge import as_printed_proofs, edge_proofs
 from cubestack.hdl.proofs.properties import AUXILIARY, starts_in, wires_below, writer_wires
 from cubestack.hdl.proofs.prover import Proof, StuckWire
+from cubestack.hdl.proofs.strides import stride_proof
 
 # The address never leaves the image.
 
@@ -167,7 +168,26 @@ def _proofs(side: Side) -> dict[str, Proof]:
     }
 
 
+def pair(mcu_addressing: bool = False, gateware: str = "corrected") -> DesignMaker:
+    return proof_design(partial(CubeSensePair, mcu_addressing=mcu_addressing), gateware)
+
+
+#: Bugs of the storing FPGA that break each of its strides.
+STRIDE_FAULTS = {
+    "row": StuckWire("pix_writer.counter.last_column", 1),
+    "pause": StuckWire("pix_gap.long", 1),
+    "row-before": StuckWire("pix_writer.accept", 1),
+    "pause-before": StuckWire("pix_gap.long", 1),
+}
+
 PROOFS = {
+    **{
+        f"pair-strides-{gateware}{'-addressing' * mcu_addressing}": stride_proof(
+            pair(mcu_addressing, gateware), StuckWire("sun.pix_gap.long", 1)
+        )
+        for gateware in table.READ_OUTS
+        for mcu_addressing in (False, True)
+    },
     **{
         f"pair-drivers{'-addressing' * mcu_addressing}": Proof(
             "No wire of the two FPGAs has two drivers in any settled state",

@@ -122,8 +122,8 @@ PROOFS = {
         StuckWire("reader.counter.last_column", 0),
         wires_below("reader.counter", "column", "row"),
     ),
-    "cubestar-row": stride_proof(full(CubeStarTop), "row", ROW_ENDS),
+    "cubestar-row": stride_proof(full(CubeStarTop), ROW_ENDS, "row"),
     "cubestar-row-read": stride_proof(
-        full(CubeStarTop), "row-read", StuckWire("reader.counter.last_column", 1)
+        full(CubeStarTop), StuckWire("reader.counter.last_column", 1), "row-read"
     ),
 }

@@ -130,7 +130,7 @@ PROOFS = {
     "cubestar-shared-idle": Proof(
         published.BANK_RESTS, _SHARED, partial(published.bank_rests, SHARED), StuckWire("bus.on", 1)
     ),
-    "cubestar-shared-row": stride_proof(_SHARED, "row", published.ROW_ENDS),
+    "cubestar-shared-row": stride_proof(_SHARED, published.ROW_ENDS, "row"),
     "cubestar-double-ack": Proof(
         properties.ACKNOWLEDGES,
         _DOUBLE,
@@ -167,8 +167,8 @@ PROOFS = {
         _double_idle,
         StuckWire("bus.on", 1),
     ),
-    "cubestar-double-row-1": stride_proof(_DOUBLE, "row-1", published.ROW_ENDS),
-    "cubestar-double-row-2": stride_proof(_DOUBLE, "row-2", published.ROW_ENDS),
+    "cubestar-double-row-1": stride_proof(_DOUBLE, published.ROW_ENDS, "row-1"),
+    "cubestar-double-row-2": stride_proof(_DOUBLE, published.ROW_ENDS, "row-2"),
     "cubestar-boards-ack": Proof(
         properties.ACKNOWLEDGES,
         _BOARDS,

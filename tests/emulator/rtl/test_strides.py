@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 import pytest
 
+from cubestack.emulator.boards.cubesense.wiring import cubesense_wiring
 from cubestack.emulator.boards.cubestar.wiring import (
     cubestar_double_wiring,
     cubestar_shared_wiring,
@@ -18,7 +19,12 @@ from cubestack.emulator.rtl.contract import RtlEngine
 from cubestack.emulator.rtl.cxxrtl.engine import CompiledEngine
 from cubestack.emulator.rtl.sram import SramTiming
 from cubestack.emulator.rtl.wiring import Wiring
+from cubestack.firmware_model.interface.cubesense.fpga import READ_OUTS
+from cubestack.hdl.cubesense.pair import CubeSensePair
 from tests.emulator.rtl.cameras import ListCamera, assert_same, read
+from tests.tiers import quick
+
+from .pair_board import ENABLES, SIDES
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
 
@@ -35,8 +41,12 @@ SLOW_PARTS = (
 
 
 @contextmanager
-def both(wiring: Wiring, timing: SramTiming | None = None) -> Iterator[list[CompiledEngine]]:
-    engines = [CompiledEngine(wiring, timing, skipping=skipping) for skipping in (True, False)]
+def both(
+    wiring: Wiring, timing: SramTiming | None = None, *, exact: bool = True
+) -> Iterator[list[CompiledEngine]]:
+    """The engine, and the exact one, or else the same without strides."""
+    engines = [CompiledEngine(wiring, timing, skipping=skips) for skips in (True, not exact)]
+    engines[1].use_strides(False)
     yield engines
     for engine in engines:
         engine.close()
@@ -79,6 +89,49 @@ def test_both_engines_store_the_same_image(board: Callable[[], Wiring], seed: in
                 step(engines, lambda engine, n=name, b=bit: engine.flip(n, b), (name, bit))
         assert engines[0].stride_clocks > 10 * COLUMNS
         assert engines[1].stride_clocks == 0
+
+
+def pair_camera(rng: np.random.Generator, gateware: str) -> ListCamera:
+    """A part of a frame, then whole ones with bright pixels anywhere, alone and in runs."""
+    size = READ_OUTS[gateware]
+    columns = size.columns - int(rng.integers(-9, 10)) * int(rng.random() < 0.5)
+    found = ListCamera(Fraction(10**12, 13_500_000), columns + int(rng.integers(1, 230)), columns)
+    for rows in (int(rng.integers(2, 30)), size.rows - int(rng.random() < 0.3), size.rows):
+        image = rng.integers(0, 200, (rows, columns), np.uint8)
+        for y, x in zip(rng.integers(0, rows, 20), rng.integers(0, columns, 20), strict=True):
+            image[y, x : x + int(rng.integers(1, 9))] = int(rng.integers(199, 256))
+        found.add_image(image)
+        found.add_blank(int(rng.integers(size.frame_gap - 3, size.frame_gap + 9)))
+    return found
+
+
+@pytest.mark.parametrize(
+    ("gateware", "seed"), quick([(name, seed) for name in READ_OUTS for seed in range(6)], 3)
+)
+def test_both_engines_of_the_pair_store_the_same_images(gateware: str, seed: int) -> None:
+    """One half or both. The exact engine also runs cameras whose images are stored."""
+    rng = np.random.default_rng(seed)
+    wiring = cubesense_wiring(CubeSensePair(READ_OUTS[gateware], mcu_addressing=seed > 3))
+    sources = {side: pair_camera(rng, gateware) for side in SIDES}
+    with both(wiring, exact=False) as engines:
+        registers = engines[0].registers
+        for engine in engines:
+            for side, source in sources.items():
+                engine.attach(source, side)
+        end_ps = max(source.end_ps for source in sources.values())
+        halves = (ENABLES[:1], ENABLES[1:], ENABLES)[seed % 3]
+        for name in halves:
+            step(engines, lambda engine, n=name: engine.set_pin(n, 0), name)
+        for number, time_ps in enumerate(np.sort(rng.integers(0, end_ps, 50))):
+            step(engines, lambda engine, t=int(time_ps): engine.run(t), number)
+            if number % 10 == 9:
+                name = list(registers)[int(rng.integers(len(registers)))]
+                bit = int(rng.integers(registers[name]))
+                step(engines, lambda engine, n=name, b=bit: engine.flip(n, b), (name, bit))
+        step(engines, lambda engine: engine.run(end_ps), "end")
+        assert engines[1].stride_clocks == 0
+        # While both cameras' clocks run there are none.
+        assert (engines[0].stride_clocks > 100_000) or halves == ENABLES
 
 
 @pytest.mark.parametrize("seed", range(3))
