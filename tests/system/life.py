@@ -79,13 +79,16 @@ def life(
         }
 
 
-def pair_life(seed: int, gateware: str, design: str = "") -> dict[str, object]:
+def pair_life(
+    seed: int, gateware: str, design: str = "", *, strides: bool = True, upsets: bool = False
+) -> dict[str, object]:
     """Traffic and final state of a CubeSense with random poses, memories and faults.
 
     Args:
         seed: of everything.
         gateware: value of the switch, which the program follows.
         design: files of both FPGAs in place of the shipped ones.
+        upsets: faults of the FPGAs' registers too, and their state at the end.
     """
     rng = np.random.default_rng(seed)
     scene = EarthSunScene.facing(
@@ -94,10 +97,11 @@ def pair_life(seed: int, gateware: str, design: str = "") -> dict[str, object]:
     chosen = {"set": f"gateware={gateware}"} | ({"gateware": design} if design else {})
     view = EarthSunView(scene, FisheyeCondition(hot_pixels=20, seed=seed))
     with open_device("cubesense", view, seed=seed, engine="compiled", **chosen) as opened:
+        opened.board.engine.use_strides(strides)
         recording = StringIO()
         recorder = start_recorder(opened, recording)
         kinds = [kind for kind, fault in FAULTS.items() if opened.faults.targets(fault.site)]
-        kinds = [kind for kind in kinds if not kind.startswith("register-")]
+        kinds = [kind for kind in kinds if upsets or not kind.startswith("register-")]
         opened.faults.seed = seed
         for kind in rng.choice(kinds, FAULTS_AT_ONCE):
             targets = opened.faults.targets(FAULTS[kind].site)
@@ -115,6 +119,7 @@ def pair_life(seed: int, gateware: str, design: str = "") -> dict[str, object]:
         return {
             # without the header, which names the gateware
             "recording": recording.getvalue().splitlines()[1:],
+            "registers": board.engine.state() if upsets else b"",
             "memories": [memory.tobytes() for memory in board.sites().all_memories().values()],
             "violations": (board.engine.violations, dict(board.engine.violation_counts)),
             "now": board.kernel.now,

@@ -133,3 +133,13 @@ def test_strides_do_not_change_the_run(turn: int) -> None:
     with_strides, exact = life(seed, strides=True), life(seed, strides=False)
     assert [name for name in exact if with_strides[name] != exact[name]] == [], f"seed {seed}"
     assert str(exact["recording"]).count("\n") > 4
+
+
+@pytest.mark.parametrize(
+    ("gateware", "turn"), quick([(gateware, n) for gateware in READ_OUTS for n in range(6)], 1)
+)
+def test_strides_do_not_change_the_run_of_the_pair(gateware: str, turn: int) -> None:
+    seed = todays(turn, 6, 60)
+    with_strides = pair_life(seed, gateware, upsets=True)
+    without = pair_life(seed, gateware, strides=False, upsets=True)
+    assert [name for name in without if with_strides[name] != without[name]] == [], f"seed {seed}"
