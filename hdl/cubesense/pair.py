@@ -10,7 +10,7 @@ from cubestack.firmware_model.interface.cubesense import pins
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, ReadOut
 from cubestack.firmware_model.interface.pins import resized
 from cubestack.hdl.blocks.pinned import PinnedComponent, Stride, connect_ports
-from cubestack.hdl.cubesense.dataflow import Side
+from cubestack.hdl.cubesense.dataflow import SIDES, Side
 from cubestack.hdl.cubesense.strides import strides_of
 from cubestack.hdl.cubesense.top import CubeSenseFpga
 
@@ -43,7 +43,7 @@ class CubeSensePair(PinnedComponent):
 
     @property
     def strides(self) -> tuple[Stride, ...]:
-        return tuple(one for side in pins.PREFIXES for one in strides_of(side, self.read_out))
+        return tuple(one for side in SIDES for one in strides_of(side, self.read_out))
 
     def _fpga(self, side: Side) -> PinnedComponent:
         return CubeSenseFpga(side, self.read_out, self.mcu_addressing)

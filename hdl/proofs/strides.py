@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from types import SimpleNamespace
+from typing import Any
 
 from amaranth.hdl import Assert, Cat, Const, Module, Mux, Value
 from amaranth.lib.wiring import In
@@ -11,7 +12,7 @@ from cubestack.hdl.proofs.model import past
 from cubestack.hdl.proofs.properties import first_step
 from cubestack.hdl.proofs.prover import Proof, StuckWire
 
-Make = Callable[[bool], tuple[PinnedComponent, SimpleNamespace]]
+Make = Callable[[bool], tuple[PinnedComponent, Any]]
 
 
 def stride_proof(make: Make, fault: StuckWire, *names: str) -> Proof:

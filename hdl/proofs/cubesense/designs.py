@@ -5,14 +5,14 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 from amaranth.hdl import Value
-from amaranth.lib.wiring import Component
 
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, READ_OUTS, ReadOut
+from cubestack.hdl.blocks.pinned import PinnedComponent
 from cubestack.hdl.cubesense.dataflow import Side
 from cubestack.hdl.cubesense.top import CubeSenseFpga
 
 #: Creates a design and returns it with its size; small if the argument is True.
-DesignMaker = Callable[[bool], tuple[Component, ReadOut]]
+DesignMaker = Callable[[bool], tuple[PinnedComponent, ReadOut]]
 
 #: Small enough that a counterexample takes a few clocks.
 SMALL = ReadOut(
@@ -21,11 +21,11 @@ SMALL = ReadOut(
 
 
 def proof_design(
-    design: Callable[[ReadOut], Component], gateware: str = "corrected"
+    design: Callable[[ReadOut], PinnedComponent], gateware: str = "corrected"
 ) -> DesignMaker:
     """A function that creates the design for :class:`cubestack.hdl.proofs.prover.Proof`."""
 
-    def make(small: bool) -> tuple[Component, ReadOut]:
+    def make(small: bool) -> tuple[PinnedComponent, ReadOut]:
         known = READ_OUTS[gateware]
         options = {"as_printed": known.as_printed, "one_search": known.one_search}
         size = replace(SMALL if small else FULL_SIZE, **options)
