@@ -37,6 +37,7 @@ from cubestack.firmware_model.values import (
 from cubestack.host.devices.registry import devices
 from cubestack.host.options import Options
 from cubestack.host.studies.powerfail.scenario import Question, Step
+from tests.together import together
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("firmware_model", "emulator", "host")
@@ -229,7 +230,7 @@ def filled(one: Declaration, value: Any) -> Any:
     return [filled(one.part, value)] * (2 if one.count is None else one.count)
 
 
-@pytest.mark.parametrize("owner", OWNERS, ids=lambda one: one.__name__)
+@together("owner", OWNERS, ids=lambda one: one.__name__)
 def test_values_beyond_their_limits_are_refused_by_name(owner: type[Any]) -> None:
     for name, one in owner.declared().items():
         assert one.meaning
@@ -245,7 +246,7 @@ def test_values_beyond_their_limits_are_refused_by_name(owner: type[Any]) -> Non
             )
 
 
-@pytest.mark.parametrize("owner", OWNERS, ids=lambda one: one.__name__)
+@together("owner", OWNERS, ids=lambda one: one.__name__)
 def test_values_of_another_type_are_refused_by_name(owner: type[Any]) -> None:
     for name, one in owner.declared().items():
         for wrong in of_other_kinds(scalar(one)):
@@ -264,7 +265,7 @@ FIELDS = [
 ]
 
 
-@pytest.mark.parametrize("field", FIELDS)
+@together("field", FIELDS)
 def test_message_fields_allow_what_is_within_their_limits(field: Field) -> None:
     for limit, outward in ((field.low, -1), (field.high, 1)):
         raw = field.encode(limit, saturate=False)

@@ -14,6 +14,7 @@ import pytest
 from cubestack.hdl.flow.generate import verilog_text
 from tests.hdl.regression import FULL, TIERS, run_tier
 from tests.tiers import quick
+from tests.together import together
 
 
 @dataclass(frozen=True)
@@ -196,7 +197,7 @@ def test_planted_bug_is_caught(bug: Bug, top: str, tmp_path: Path) -> None:
     assert outcome.failed, outcome.problem or "not caught"
 
 
-@pytest.mark.parametrize("bug", BUGS, ids=lambda bug: f"{bug.title}, {bug.module}")
+@together("bug", BUGS, ids=lambda bug: f"{bug.title}, {bug.module}")
 def test_planted_text_occurs_once_in_its_module(bug: Bug) -> None:
     source_of(bug)
 

@@ -9,6 +9,7 @@ from tests.mutation.__main__ import chosen
 from tests.mutation.mutants import Mutant, modules, mutants
 from tests.mutation.reached import DATA, DOCUMENTS, FOLDER, MOST_TESTS, TIMES, Reached
 from tests.mutation.trial import ROOT, files_for, near
+from tests.together import together
 
 HERE = Path("a.py")
 
@@ -25,7 +26,7 @@ def record(root: Path, tests: dict[str, float], ran: list[tuple[str, int]], path
     return Reached(root)
 
 
-@pytest.mark.parametrize(
+@together(
     ("text", "expected"),
     [
         ("a < b", ["(a <= b)"]),

@@ -13,6 +13,7 @@ from cubestack.emulator.faults import table
 from cubestack.emulator.faults.injection import Injection
 from cubestack.emulator.faults.pixels import FaultySource
 from cubestack.emulator.rtl.pixel_clock import LoadedSegment
+from tests.together import together
 
 ROWS, COLUMNS, LINE = 5, 6, 9
 PERIOD = Fraction(1000, 3)
@@ -84,8 +85,8 @@ def test_pixel_stream_is_unchanged_without_faults() -> None:
     near(list(clocks(faulty(table.ClockLost(rate=0.0, row=1))[0], 3 * FRAME_PS)), CLEAN)
 
 
-@pytest.mark.parametrize("column", range(COLUMNS))
-@pytest.mark.parametrize("row", [0, 2, ROWS - 1])
+@together("column", range(COLUMNS))
+@together("row", [0, 2, ROWS - 1])
 def test_lost_clock_removes_one_pixel_edge(row: int, column: int) -> None:
     source, log = faulty(table.ClockLost(row=row, column=column))
     lost = {n * (ROWS * LINE + BLANK) + row * LINE + column for n in range(3)}

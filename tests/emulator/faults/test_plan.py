@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from cubestack.emulator.faults import table
 from cubestack.emulator.faults.declaration import FaultError
 from cubestack.emulator.faults.plan import PlannedFault, load_plan, parse_plan
+from tests.together import together
 
 PLAN = """
 seed = 7
@@ -94,7 +95,7 @@ def test_damaged_plans_raise_only_plan_errors() -> None:
 DOCUMENT = Path(__file__).parents[3] / "docs" / "reference" / "fault-kinds.md"
 
 
-@pytest.mark.parametrize("kind", table.FAULTS)
+@together("kind", table.FAULTS)
 def test_every_fault_has_a_kind_defaults_and_a_description(kind: str) -> None:
     fault = table.FAULTS[kind]
     assert fault.kind == kind

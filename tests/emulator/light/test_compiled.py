@@ -15,6 +15,7 @@ from cubestack.emulator.native import compiler
 from cubestack.emulator.native.cache import collected
 from cubestack.emulator.native.compiler import find_compiler
 from cubestack.emulator.scene.sky import SkyScene
+from tests.together import together
 
 needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
 
@@ -109,9 +110,9 @@ def test_points_without_distortion_are_equal(seed: int) -> None:
 
 
 @needs_compiler
-@pytest.mark.parametrize("glow", [0.0, 0.0016])
-@pytest.mark.parametrize("unevenness", [0.0, 0.03, 0.6])
-@pytest.mark.parametrize("distance", [1.03, 1.12, 6.6])
+@together("glow", [0.0, 0.0016])
+@together("unevenness", [0.0, 0.03, 0.6])
+@together("distance", [1.03, 1.12, 6.6])
 def test_globes_are_equal(distance: float, unevenness: float, glow: float) -> None:
     rng = np.random.default_rng(int(100 * distance))
     vectors = rng.normal((0, 0, 1), 1, (5003, 3))

@@ -13,6 +13,7 @@ from cubestack.firmware_model.aramis.pipeline import PUBLISHED, VERIFIED, Config
 from cubestack.firmware_model.aramis.pipeline import solve as solve_picture
 from cubestack.firmware_model.aramis.solution import Solution
 from cubestack.host.studies.aramis.sky import FIELD, Light, database, meter, picture
+from tests.together import together
 
 from ..operations import as_on_record
 from .test_pipeline import sky
@@ -58,9 +59,9 @@ def test_image_processing_charges_the_recorded_operations(name: str) -> None:
     as_on_record(f"AraMiS picture: {name}", spent, numbers(found))
 
 
-@pytest.mark.parametrize("profile", PROFILES)
-@pytest.mark.parametrize("light", LISTS)
-@pytest.mark.parametrize("hint_deg", [None, 2.0])
+@together("profile", PROFILES)
+@together("light", LISTS)
+@together("hint_deg", [None, 2.0])
 def test_matching_of_star_lists_charges_the_recorded_operations(
     light: str, profile: str, hint_deg: float | None
 ) -> None:

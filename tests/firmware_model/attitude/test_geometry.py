@@ -21,6 +21,7 @@ from cubestack.firmware_model.attitude.geometry import (
 )
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
 from cubestack.firmware_model.mcu.costs import Meter
+from tests.together import together
 
 #: Figure 5.12 with the signs of the coefficients inverted, focal length from star pairs (5.4).
 C = CameraParameters(6.28, 1147.5, 1147.4, 539.0, 175.5, 0.32358, -0.12456, -0.00414, 0.00624)
@@ -64,7 +65,7 @@ def test_undistortion_cost_is_proportional_to_the_points() -> None:
     assert costs[2] - costs[0] == 11 * (costs[1] - costs[0]) > 0
 
 
-@pytest.mark.parametrize("seed", range(20))
+@together("seed", range(20))
 def test_sky_angles_and_directions_are_inverse(seed: int) -> None:
     rng = np.random.default_rng(seed)
     ra, dec = rng.uniform(-3.14, 3.14), rng.uniform(-1.57, 1.57)

@@ -17,6 +17,7 @@ from cubestack.firmware_model.attitude.quest import dcm
 from cubestack.firmware_model.attitude.robust_fit import robust_fit
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
 from cubestack.firmware_model.mcu.costs import Meter
+from tests.together import together
 
 Floats = NDArray[np.float32]
 Reals = NDArray[np.float64]
@@ -83,8 +84,8 @@ def test_a_lens_as_described_is_believed_as_if_not_judged(seed: int) -> None:
     assert is_within(verdict, error)
 
 
-@pytest.mark.parametrize("stars", [4, 7, 14])
-@pytest.mark.parametrize("seed", range(8))
+@together("stars", [4, 7, 14])
+@together("seed", range(8))
 def test_a_lens_within_its_tolerance_is_never_refused(seed: int, stars: int) -> None:
     rng = np.random.default_rng(seed)
     x, y = TOLERANCE.point * rng.standard_normal(2)
@@ -94,8 +95,8 @@ def test_a_lens_within_its_tolerance_is_never_refused(seed: int, stars: int) -> 
     assert is_within(verdict, error)
 
 
-@pytest.mark.parametrize("seed", range(8))
-@pytest.mark.parametrize("linear", [((0.005, 0), (0, 0)), ((0.02, 0), (0, 0)), ((0, 0.02), (0, 0))])
+@together("seed", range(8))
+@together("linear", [((0.005, 0), (0, 0)), ((0.02, 0), (0, 0)), ((0, 0.02), (0, 0))])
 def test_pixels_of_another_shape_are_recognised_and_corrected(
     seed: int, linear: tuple[tuple[float, float], tuple[float, float]]
 ) -> None:
@@ -106,8 +107,8 @@ def test_pixels_of_another_shape_are_recognised_and_corrected(
     assert verdict.is_refused or np.hypot(*error[:2]) < np.radians(0.1)
 
 
-@pytest.mark.parametrize("seed", range(8))
-@pytest.mark.parametrize("px", [5.0, 20.0, 40.0])
+@together("seed", range(8))
+@together("px", [5.0, 20.0, 40.0])
 def test_a_principal_point_elsewhere_is_recognised(seed: int, px: float) -> None:
     verdict, error = judged(seed, shift=(px * 0.8, -px * 0.6))
     assert verdict.model is not None

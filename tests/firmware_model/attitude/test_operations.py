@@ -15,6 +15,7 @@ from cubestack.firmware_model.attitude.robust_fit import robust_fit
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.star_tracker import confirmation
+from tests.together import together
 
 from ..operations import as_on_record
 
@@ -77,8 +78,8 @@ CASES: dict[str, Callable[[int, Meter], object]] = {
 }
 
 
-@pytest.mark.parametrize("count", [4, 13])
-@pytest.mark.parametrize("name", CASES)
+@together("count", [4, 13])
+@together("name", CASES)
 def test_attitude_solvers_charge_the_recorded_operations(name: str, count: int) -> None:
     meter = Meter(CORTEX_M3)
     CASES[name](count, meter)

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from cubestack.firmware_model.attitude.quest import AttitudeError, _determinant, dcm, quest
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
 from cubestack.firmware_model.mcu.costs import Meter
+from tests.together import together
 
 Matrix = NDArray[np.float64]
 
@@ -41,7 +42,7 @@ def attitude_of(quaternion: NDArray[np.float32]) -> Matrix:
     return np.asarray(Rotation.from_quat(quaternion.astype(np.float64)).as_matrix())
 
 
-@pytest.mark.parametrize("seed", range(200))
+@together("seed", range(200))
 def test_quest_finds_the_optimal_attitude_of_noisy_vectors(seed: int) -> None:
     rng = np.random.default_rng(seed)
     count = int(rng.integers(3, 21))
@@ -58,8 +59,8 @@ def test_quest_finds_the_optimal_attitude_of_noisy_vectors(seed: int) -> None:
     assert found[3] >= 0
 
 
-@pytest.mark.parametrize("off_deg", [0.0, 1e-6, 1e-3, 0.1, 2.0])
-@pytest.mark.parametrize("seed", range(20))
+@together("off_deg", [0.0, 1e-6, 1e-3, 0.1, 2.0])
+@together("seed", range(20))
 def test_rotations_near_180_deg_lose_no_accuracy(off_deg: float, seed: int) -> None:
     rng = np.random.default_rng(seed)
     axis = rng.normal(size=3) if seed > 2 else np.eye(3)[seed]
@@ -99,7 +100,7 @@ def test_printed_equation_fails_near_180_deg() -> None:
         printed(np.eye(3)[:2], np.eye(3)[:2] @ half, Meter(CORTEX_M3))
 
 
-@pytest.mark.parametrize("seed", range(20))
+@together("seed", range(20))
 def test_dcm_is_the_rotation_of_the_quaternion(seed: int) -> None:
     quaternion = Rotation.random(random_state=seed).as_quat().astype(np.float32)
     found = dcm(quaternion, Meter(CORTEX_M3))

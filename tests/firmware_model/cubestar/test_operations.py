@@ -12,6 +12,7 @@ from cubestack.firmware_model.cubestar.matching import confirmed, voting
 from cubestack.firmware_model.cubestar.matching.identification import Identification
 from cubestack.firmware_model.cubestar.matching.tracking import track
 from cubestack.firmware_model.star_tracker.search import MatchOutcome
+from tests.together import together
 
 from ..operations import as_on_record
 from .detection.pictures import drawn, spots, taken
@@ -48,8 +49,8 @@ SEARCHES = {
 }
 
 
-@pytest.mark.parametrize("search", SEARCHES)
-@pytest.mark.parametrize("picture", PICTURES)
+@together("search", SEARCHES)
+@together("picture", PICTURES)
 def test_star_detection_charges_the_recorded_operations(picture: str, search: str) -> None:
     spent = meter()
     found = detect_stars(PICTURES[picture], SEARCHES[search], spent)
@@ -75,9 +76,9 @@ SHOTS = {
 }
 
 
-@pytest.mark.parametrize("hinted", [False, True])
-@pytest.mark.parametrize("shot", SHOTS)
-@pytest.mark.parametrize("way", ["votes", "confirmed"])
+@together("hinted", [False, True])
+@together("shot", SHOTS)
+@together("way", ["votes", "confirmed"])
 def test_identification_charges_the_recorded_operations(
     catalogue: StarCatalogue, shoot: Shoot, way: str, shot: str, hinted: bool
 ) -> None:

@@ -14,6 +14,7 @@ from cubestack.firmware_model.interface.cubestar import (
     TaskStatus,
 )
 from cubestack.firmware_model.node.state import FIRMWARE_VERSION, SERIAL_NUMBER
+from tests.together import together
 
 from ..registry import registered_in
 from .harness import Harness
@@ -220,7 +221,7 @@ def test_telemetry_requests_do_not_change_telemetry(lit: Harness) -> None:
 # --- tables ---------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("frame", SETTINGS_SHOWN | TIMES_SHOWN)
+@together("frame", SETTINGS_SHOWN | TIMES_SHOWN)
 def test_every_field_of_a_settings_or_times_frame_is_tested(frame: str) -> None:
     shown = {**SETTINGS_SHOWN, **TIMES_SHOWN}[frame]
     assert list(shown) == [field.name for field in INTERFACE.telemetry(frame).fields]

@@ -10,6 +10,7 @@ from cubestack.firmware_model.interface.cubesense import pins as cubesense
 from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
 from cubestack.firmware_model.interface.cubestar import pins as cubestar
 from cubestack.firmware_model.interface.pins import Direction, Pin, Port, resized, sram_pins
+from tests.together import together
 
 INTERFACES = (CUBESTAR, CUBESENSE, ARAMIS)
 MESSAGES = [
@@ -20,7 +21,7 @@ MESSAGES = [
 each = pytest.mark.parametrize("interface", INTERFACES, ids=lambda interface: interface.name)
 
 
-@pytest.mark.parametrize("message", MESSAGES)
+@together("message", MESSAGES)
 def test_every_message_and_field_is_explained_and_round_trips(message: Message) -> None:
     for text in [message.meaning, *(field.meaning for field in message.fields)]:
         assert 2 < len(text) < 100

@@ -30,6 +30,7 @@ from cubestack.firmware_model.mcu.memory import FlashStore
 from cubestack.firmware_model.node.commands import QUEUE_DEPTH
 from cubestack.firmware_model.node.link import SatelliteLink, longest_command
 from cubestack.firmware_model.node.state import NodeState
+from tests.together import together
 
 from ..cubesense.links_harness import Links
 from ..host_side import HostSide
@@ -165,7 +166,7 @@ def flags(node: Node, *names: str) -> set[str]:
     return set().union(*(node.flags[name] for name in names))
 
 
-@pytest.mark.parametrize(("node", "message"), TELECOMMANDS)
+@together(("node", "message"), TELECOMMANDS)
 def test_telecommands_are_taken_from_both_buses(node: Node, message: Message) -> None:
     unit, data = node.make(), packed(message)
     # The reset value is no direction; no picture was selected.
@@ -245,7 +246,7 @@ def test_repeated_start_ends_a_telecommand(node: Node, unit: Any) -> None:
     assert len(unit.queue) == 1
 
 
-@pytest.mark.parametrize(("node", "message"), TELEMETRIES)
+@together(("node", "message"), TELEMETRIES)
 def test_every_telemetry_frame_answers_on_both_buses(node: Node, message: Message) -> None:
     unit = node.make()
     (answer,) = unit.frames(bytes([message.id, 1, 2, 3]))  # parameters are ignored

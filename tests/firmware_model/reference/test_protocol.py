@@ -18,6 +18,7 @@ from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.firmware_model.node.link import longest_command
 from cubestack.firmware_model.reference.tables import generate
 from cubestack.host.export.c_header import c_header
+from tests.together import together
 
 SOURCES = Path(__file__).parents[3] / "firmware_model" / "reference"
 LONGEST_PAYLOAD = longest_command(INTERFACE) + 1
@@ -72,7 +73,7 @@ def _packed(library: CDLL, field: Field, value: float) -> int:
     return int.from_bytes(bytes(data), "little") >> field.bit_offset
 
 
-@pytest.mark.parametrize("message", INTERFACE.telemetries, ids=lambda message: message.name)
+@together("message", INTERFACE.telemetries, ids=lambda message: message.name)
 def test_c_reference_packs_telemetry_like_the_python_codec(library: CDLL, message: Message) -> None:
     rng = np.random.default_rng(message.id)
     for field in message.fields:
@@ -103,7 +104,7 @@ def _parameters(message: Message, rng: np.random.Generator) -> bytes:
     return bytes(data)
 
 
-@pytest.mark.parametrize("message", INTERFACE.telecommands, ids=lambda message: message.name)
+@together("message", INTERFACE.telecommands, ids=lambda message: message.name)
 def test_c_reference_refuses_the_same_parameters_as_the_table(
     library: CDLL, message: Message
 ) -> None:
@@ -130,7 +131,7 @@ def test_c_reference_knows_the_same_message_ids(library: CDLL) -> None:
             assert (found[0], found[1]) == (message.id, message.length)
 
 
-@pytest.mark.parametrize("seed", range(20))
+@together("seed", range(20))
 def test_c_decoder_decodes_arbitrary_bytes_like_the_python_decoder(
     library: CDLL, seed: int
 ) -> None:

@@ -12,6 +12,7 @@ from cubestack.firmware_model.star_tracker.background import (
     estimate,
     sample_offsets,
 )
+from tests.together import together
 
 SHAPE = 512, 1024
 Y, X = np.mgrid[: SHAPE[0], : SHAPE[1]]
@@ -38,8 +39,8 @@ def test_background_interpolates_and_extrapolates_a_plane() -> None:
 
 
 @BOTH
-@pytest.mark.parametrize("sigma", [0.7, 1.5, 4.0, 9.0])
-@pytest.mark.parametrize("slope", [0.0, 60.0])
+@together("sigma", [0.7, 1.5, 4.0, 9.0])
+@together("slope", [0.0, 60.0])
 def test_background_level_and_noise_are_measured_despite_stars(
     sigma: float, slope: float, step: int, smooth: bool
 ) -> None:

@@ -5,9 +5,10 @@ import pytest
 from scipy import ndimage
 
 from cubestack.firmware_model.star_tracker.regions import Moments, Runs
+from tests.together import together
 
 
-@pytest.mark.parametrize("seed", range(30))
+@together("seed", range(30))
 def test_touching_runs_form_one_region_with_its_moments(seed: int) -> None:
     rng = np.random.default_rng(seed)
     height, width = (int(size) for size in rng.integers(2, 60, 2))

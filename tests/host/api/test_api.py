@@ -9,9 +9,10 @@ import pytest
 import cubestack
 from cubestack import sensor
 from cubestack.firmware_model.interface.codec.field import u8
+from tests.together import together
 
 
-@pytest.mark.parametrize("name", cubestack.__all__)
+@together("name", cubestack.__all__)
 def test_every_public_name_is_documented(name: str) -> None:
     value = getattr(cubestack, name)
     assert name == "__version__" or value.__doc__
@@ -56,7 +57,7 @@ def test_script_needs_one_import() -> None:
         assert aramis.client.telemetry("Identification")["InterfaceVersion"] == 1
 
 
-@pytest.mark.parametrize("name", sensor.__all__)
+@together("name", sensor.__all__)
 def test_every_name_loads(name: str) -> None:
     assert getattr(sensor, name) is not None
     assert name in dir(sensor)

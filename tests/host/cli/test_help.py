@@ -11,6 +11,7 @@ from cubestack.host.cli.commands import commands
 from cubestack.host.cli.main import make_parser
 from cubestack.host.devices.registry import device_names
 from tests.conftest import Run
+from tests.together import together
 
 TOLD = re.compile(r"\(?default:? \(?(-?[\d.]+(?:,-?[\d.]+)*)(?![\w.]*[a-z])")
 
@@ -38,7 +39,7 @@ def test_help_texts_contain_numeric_defaults() -> None:
     assert len(NUMBERS) > 30
 
 
-@pytest.mark.parametrize(("name", "action", "told"), NUMBERS, ids=[one[0] for one in NUMBERS])
+@together(("name", "action", "told"), NUMBERS, ids=[one[0] for one in NUMBERS])
 def test_help_text_shows_the_actual_default(name: str, action: argparse.Action, told: str) -> None:
     values = action.default if isinstance(action.default, tuple) else (action.default,)
     assert [float(value) for value in told.rstrip(".").split(",")] == pytest.approx(

@@ -19,6 +19,7 @@ from cubestack.host.experiments.hazard_options import (
     known,
     with_hazards,
 )
+from tests.together import together
 
 VIEW = SkyView(SkyScene.pointing(84, -1), CONDITION)
 
@@ -45,7 +46,7 @@ def test_rejects_unknown_hazards_and_strengths(
         options(hazard=(given,))
 
 
-@pytest.mark.parametrize("name", sorted(set(known()) - set(EARTH_HAZARDS)))
+@together("name", sorted(set(known()) - set(EARTH_HAZARDS)))
 def test_hazard_is_added_to_scene_or_condition_at_every_strength(name: str) -> None:
     for strength in known()[name].strength.values:
         view = VIEW
@@ -55,8 +56,8 @@ def test_hazard_is_added_to_scene_or_condition_at_every_strength(name: str) -> N
         assert VIEW.scene.hazards == VIEW.condition.hazards == ()
 
 
-@pytest.mark.parametrize("camera", CameraTarget)
-@pytest.mark.parametrize("name", sorted(known()))
+@together("camera", CameraTarget)
+@together("name", sorted(known()))
 def test_earth_hazard_is_added_for_its_cameras_only(name: str, camera: CameraTarget) -> None:
     kind = known()[name]
     view = random_view(CubeSenseOptions(), Camera(camera), np.random.default_rng(1))

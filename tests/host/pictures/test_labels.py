@@ -8,6 +8,7 @@ from cubestack.emulator.native.compiler import find_compiler
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.host.pictures.labels import Box, Wanted, distance, place
 from cubestack.host.studies.cubestar.demo import left_out_by
+from tests.together import together
 
 FRAME = Box(0, 0, 1024, 512)
 
@@ -26,7 +27,7 @@ def field(seed: int) -> tuple[list[Wanted], list[Box]]:
     return wanted, [Box(w.x - 10, w.y - 10, w.x + 10, w.y + 10) for w in wanted]
 
 
-@pytest.mark.parametrize("seed", range(60))
+@together("seed", range(60))
 def test_labels_do_not_overlap_and_stay_inside(seed: int) -> None:
     wanted, marks = field(seed)
     boxes = place(wanted, FRAME, marks)

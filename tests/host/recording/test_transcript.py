@@ -21,6 +21,7 @@ from cubestack.host.emulation.emulated import open_device
 from cubestack.host.emulation.records import start_recorder
 from cubestack.host.recording.transcript import COLUMNS, LINE, TranscriptEntry, transcript
 from tests.conftest import Run
+from tests.together import together
 
 INTERFACE, CUBESTAR = (device(name).interface for name in ("cubesense", "cubestar"))
 CONFIGURATION = INTERFACE.telemetry("Configuration")
@@ -165,7 +166,7 @@ def told(interface: Interface, *transfers: BusTransfer) -> list[TranscriptEntry]
     return transcript(Recording("a", "any", events=transfers), interface)
 
 
-@pytest.mark.parametrize(("interface", "message"), MESSAGES)
+@together(("interface", "message"), MESSAGES)
 def test_each_field_has_a_number_or_text_and_a_unit(interface: Interface, message: Message) -> None:
     reset = message.reset_values()
     asked = (bytes([message.id]), False), (message.pack(**reset), True)

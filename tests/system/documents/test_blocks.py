@@ -21,6 +21,7 @@ from cubestack.host.cli.main import make_parser
 from cubestack.host.emulation.emulated import open_device
 from tests.conftest import Run
 from tests.system.conftest import ROOT, Served
+from tests.together import together
 
 from .blocks import BLOCKS, LEFT, LONG, SERVES, Code, lines_of, own_call, reader_files, words_of
 
@@ -79,13 +80,13 @@ def test_every_block_has_a_language() -> None:
     assert {one.language for one in BLOCKS} <= LANGUAGES
 
 
-@pytest.mark.parametrize("block", of("python"))
+@together("block", of("python"))
 def test_python_blocks_compile(block: Code) -> None:
     text = block.text.replace("test_...(cubestar)", "test_any(cubestar)")
     compile(text, block.document, "exec", flags=ast.PyCF_ALLOW_TOP_LEVEL_AWAIT)
 
 
-@pytest.mark.parametrize("block", of("toml"))
+@together("block", of("toml"))
 def test_toml_blocks_parse(block: Code) -> None:
     assert tomllib.loads(block.text)
 
@@ -95,7 +96,7 @@ def test_yaml_blocks_parse(block: Code) -> None:
     assert yaml.safe_load(block.text)
 
 
-@pytest.mark.parametrize("block", of("sh"))
+@together("block", of("sh"))
 def test_documented_shell_blocks_parse(block: Code) -> None:
     done = subprocess.run(["bash", "-n"], input=block.text, text=True, capture_output=True)
     assert done.stderr == ""

@@ -24,6 +24,7 @@ from cubestack.host.cli.main import make_parser
 from cubestack.host.devices.registry import devices
 from tests.conftest import Run
 from tests.system.conftest import ROOT
+from tests.together import together
 
 EARTH, BALL = 'kind = "earth-sun"', 'kind = "ball"'
 
@@ -185,7 +186,7 @@ def test_links_point_to_files_and_headings() -> None:
 PATH = re.compile(r"`((?:docs|emulator|examples|firmware_model|hdl|host|tests)/[\w/.*?-]*)")
 
 
-@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
+@together("document", DOCUMENTS, ids=lambda path: path.name)
 def test_files_that_a_document_names_exist(document: Path) -> None:
     named = PATH.findall(document.read_text(encoding="utf-8"))
     folders = ROOT, document.parent

@@ -14,6 +14,7 @@ from cubestack.emulator.sim.virtual_time import PS_PER_MS
 from cubestack.firmware_model.interface.efm32gg import LAYOUTS
 from cubestack.firmware_model.interface.efm32gg.pins import PINS, SERIAL_UNITS, serial_locations
 from tests.emulator.boards.efm32gg.programs import needs_both_compilers
+from tests.together import together
 
 pytestmark = needs_both_compilers
 
@@ -54,7 +55,7 @@ def echoing(
     board.close()
 
 
-@pytest.mark.parametrize(("block", "location", "serial"), PLACES)
+@together(("block", "location", "serial"), PLACES)
 def test_every_block_answers_at_every_location(
     block: str, location: int, serial: str, echo: Image
 ) -> None:

@@ -12,9 +12,8 @@ both; the difference is in the branch that closes the loop.
 from pathlib import Path
 from typing import NamedTuple
 
-import pytest
-
 from tests.emulator.iss.cross_compiler import binary_of, compile_for_m3, needs_compiler
+from tests.together import together
 
 from .bench import LOG, RAM, Bench
 
@@ -149,7 +148,7 @@ def cycles(code: bytes) -> int:
     return bench.log[0].cycle
 
 
-@pytest.mark.parametrize("sequence", SEQUENCES, ids=lambda sequence: sequence.name)
+@together("sequence", SEQUENCES, ids=lambda sequence: sequence.name)
 def test_sequence_takes_the_published_cycles(sequence: Sequence):
     taken = cycles(bytes.fromhex(sequence.code)) - cycles(b"")
     assert sequence.least * (1 - TOLERANCE) <= taken <= sequence.most * (1 + TOLERANCE), (

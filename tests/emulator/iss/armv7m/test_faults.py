@@ -2,6 +2,8 @@
 
 import pytest
 
+from tests.together import together
+
 from .bench import LOCKUP, LOG, PULSE, RAM, STOP, SYSTEM, Bench
 from .thumb import Program, store
 
@@ -76,8 +78,8 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("enabled", [True, False])
-@pytest.mark.parametrize("name", CASES)
+@together("enabled", [True, False])
+@together("name", CASES)
 def test_faults_enter_their_handler_with_status_and_address(name, enabled):
     program, exception, cfsr, address, at = CASES[name]
     bench = run(f"nop; {program}", 200, enabled=enabled)

@@ -2,6 +2,8 @@
 
 import pytest
 
+from tests.together import together
+
 from .bench import PULSE, SYSTEM, Bench
 
 TYPE, CTRL, RNR, RBAR, RASR = (SYSTEM["MPU"] + 4 * n for n in range(5))
@@ -52,8 +54,8 @@ ALLOWED = {  # by AP: (privileged reads, writes, user reads, writes)
 }
 
 
-@pytest.mark.parametrize("access", ALLOWED)
-@pytest.mark.parametrize("case", range(4))
+@together("access", ALLOWED)
+@together("case", range(4))
 def test_mpu_enforces_region_access_permissions(access, case):
     bench = guarded(accessing(USER, store=bool(case & 1), privileged=case < 2))
     region(bench, 2, USER, attributes(5, access))

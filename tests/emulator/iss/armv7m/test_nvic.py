@@ -2,7 +2,7 @@
 
 import random
 
-import pytest
+from tests.together import together
 
 from .bench import SYSTEM, Bench
 
@@ -143,7 +143,7 @@ def one_action(chance: random.Random, bench: Bench, rules: Rules) -> None:
         rules.leave()
 
 
-@pytest.mark.parametrize("seed", range(SEEDS))
+@together("seed", range(SEEDS))
 def test_nvic_follows_the_reference_rules_for_random_sequences(seed):
     chance = random.Random(seed)
     bits = chance.choice([3, 3, 4, 8])

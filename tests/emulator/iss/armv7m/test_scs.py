@@ -1,6 +1,6 @@
 """Registers of the system control space: reset values, writable bits, sizes of access (B3.2)."""
 
-import pytest
+from tests.together import together
 
 from .bench import SYSTEM, Bench
 
@@ -26,7 +26,7 @@ AFTER_RESET_AND_ONES = {
 }
 
 
-@pytest.mark.parametrize("address", AFTER_RESET_AND_ONES)
+@together("address", AFTER_RESET_AND_ONES)
 def test_scs_registers_have_reset_values_and_writable_bits(address):
     bench = Bench()
     reset, ones = AFTER_RESET_AND_ONES[address]

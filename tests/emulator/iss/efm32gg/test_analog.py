@@ -2,6 +2,8 @@
 
 import pytest
 
+from tests.together import together
+
 from .bench import MS, US, Bench, S, asleep, mask_of
 
 HZ = 14_000_000
@@ -31,8 +33,8 @@ def convert(bench: Bench, word: int) -> int:
     return bench["ADC0.SINGLEDATA"]
 
 
-@pytest.mark.parametrize("channel", range(8))
-@pytest.mark.parametrize(
+@together("channel", range(8))
+@together(
     ("reference", "full"),
     [(V1_25, 1.25), (V2_5, 2.5), (SUPPLY, 3.3), (V5_DIFF, 5.0), (SUPPLY_TWICE, 6.6)],
 )

@@ -2,6 +2,8 @@
 
 import pytest
 
+from tests.together import together
+
 from .bench import MS, US, Bench, S, address_of, asleep, mask_of
 
 HZ = 14_000_000
@@ -25,9 +27,9 @@ def settled(bench: Bench, data: int, channel: int = 0) -> Bench:
     return bench
 
 
-@pytest.mark.parametrize("code", [0, 1, 2048, 4095])
-@pytest.mark.parametrize(("reference", "volts"), [(0, 1.25), (1, 2.5), (2, SUPPLY_V)])
-@pytest.mark.parametrize("channel", [0, 1])
+@together("code", [0, 1, 2048, 4095])
+@together(("reference", "volts"), [(0, 1.25), (1, 2.5), (2, SUPPLY_V)])
+@together("channel", [0, 1])
 def test_pin_has_the_voltage_of_the_code(
     channel: int, reference: int, volts: float, code: int
 ) -> None:

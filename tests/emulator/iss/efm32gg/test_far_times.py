@@ -8,6 +8,7 @@ import pytest
 from cubestack.emulator.iss.machine import NEVER
 from cubestack.emulator.iss.outcome import OutgoingKind
 from cubestack.firmware_model.interface.efm32gg import LAYOUTS
+from tests.together import together
 
 from .bench import LOOP, MS, US, WFI, Bench, S, address_of, asleep
 
@@ -79,7 +80,7 @@ def random_set_up(rng: random.Random) -> Bench:
     return bench
 
 
-@pytest.mark.parametrize("seed", range(60))
+@together("seed", range(60))
 def test_counters_with_random_registers_run_in_bounded_work(seed: int) -> None:
     bench = random_set_up(random.Random(seed))
     until = bench.now + S // 20

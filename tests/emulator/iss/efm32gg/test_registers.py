@@ -15,6 +15,7 @@ from cubestack.firmware_model.interface.efm32gg.table import (
     peripheral,
 )
 from tests.emulator.iss.cross_compiler import compile_for_m3, needs_compiler
+from tests.together import together
 
 from .bench import Bench
 
@@ -29,7 +30,7 @@ SPECIAL = {"LOCK", "DTLOCK", "FREEZE", "AUXCTRL", "HFRCOCTRL", "OSCENCMD", "EM4C
 """Registers of these units whose writes have side effects."""
 
 
-@pytest.mark.parametrize(("layout", "instance"), UNITS, ids=lambda one: one.name)
+@together(("layout", "instance"), UNITS, ids=lambda one: one.name)
 def test_reset_values_are_those_of_the_table(layout: Layout, instance: Instance) -> None:
     machine = Bench().machine
     for register in layout.registers:
@@ -38,7 +39,7 @@ def test_reset_values_are_those_of_the_table(layout: Layout, instance: Instance)
         assert int.from_bytes(value, "little") == expected, register.name
 
 
-@pytest.mark.parametrize(("layout", "instance"), UNITS, ids=lambda one: one.name)
+@together(("layout", "instance"), UNITS, ids=lambda one: one.name)
 def test_reserved_bits_read_0(layout: Layout, instance: Instance) -> None:
     for register in layout.registers:
         bench = Bench()
@@ -49,8 +50,8 @@ def test_reserved_bits_read_0(layout: Layout, instance: Instance) -> None:
         assert value & ~register.readable == 0, register.name
 
 
-@pytest.mark.parametrize("pattern", [0x5555_5555, 0xAAAA_AAAA])
-@pytest.mark.parametrize("name", PLAIN_UNITS)
+@together("pattern", [0x5555_5555, 0xAAAA_AAAA])
+@together("name", PLAIN_UNITS)
 def test_writable_bits_keep_their_values(name: str, pattern: int) -> None:
     layout, instance = next(unit for unit in UNITS if unit[1].name == name)
     for register in layout.registers:

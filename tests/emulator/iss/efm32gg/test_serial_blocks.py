@@ -7,6 +7,7 @@ import pytest
 from cubestack.emulator.iss.outcome import OutgoingKind
 from cubestack.firmware_model.interface.efm32gg import SERIAL
 from cubestack.firmware_model.interface.efm32gg.pins import SERIAL_UNITS, serial_locations
+from tests.together import together
 
 from .bench import MS, Bench, S, address_of
 
@@ -54,7 +55,7 @@ def character_s(unit: str, clkdiv: int) -> Fraction:
     return 10 * 16 * (1 + Fraction(clkdiv, 256)) / CORE_HZ
 
 
-@pytest.mark.parametrize(("unit", "location", "tx", "rx"), ROUTED)
+@together(("unit", "location", "tx", "rx"), ROUTED)
 def test_block_sends_and_receives_at_the_pins_of_its_location(
     unit: str, location: int, tx: int, rx: int
 ) -> None:
@@ -73,8 +74,8 @@ def test_block_sends_and_receives_at_the_pins_of_its_location(
     assert bench.log() == ""
 
 
-@pytest.mark.parametrize("clkdiv", [0, 0x200, 0x7FC0])
-@pytest.mark.parametrize("unit", SERIAL_UNITS)
+@together("clkdiv", [0, 0x200, 0x7FC0])
+@together("unit", SERIAL_UNITS)
 def test_character_time_follows_the_formula_of_the_manual(unit: str, clkdiv: int) -> None:
     bench = serial(unit, 0, clkdiv)
     bench[f"{unit}.TXDATA"] = 0

@@ -5,6 +5,7 @@ from fractions import Fraction
 import pytest
 
 from cubestack.emulator.iss.outcome import OutgoingKind
+from tests.together import together
 
 from .bench import Bench, S, asleep, mask_of
 
@@ -30,8 +31,8 @@ def sent(bench: Bench) -> list[int]:
     return [item.value for item in bench.out(OutgoingKind.UART)]
 
 
-@pytest.mark.parametrize("clkdiv", [0, 64, 3648, 14 << 8 | 0xC0, 0x1FFFC0])
-@pytest.mark.parametrize(("ovs", "oversampling"), [(0, 16), (1, 8), (2, 6), (3, 4)])
+@together("clkdiv", [0, 64, 3648, 14 << 8 | 0xC0, 0x1FFFC0])
+@together(("ovs", "oversampling"), [(0, 16), (1, 8), (2, 6), (3, 4)])
 def test_usart_character_has_its_duration(clkdiv: int, ovs: int, oversampling: int) -> None:
     bench = uart(clkdiv, control=ovs << 5)
     bench["UART0.TXDATA"] = 0x5A

@@ -14,6 +14,7 @@ from cubestack.firmware_model.aramis.catalogue.database import HEADER, Database,
 from cubestack.firmware_model.aramis.catalogue.geodesic import NO_FACE, geodesic_sphere
 from cubestack.firmware_model.aramis.catalogue.kvector import KVector
 from cubestack.host.studies.aramis.sky import database, meter
+from tests.together import together
 
 SMALL = CatalogueParameters(fov_deg=12, stars_per_field=4, mag_limit=4)
 
@@ -61,7 +62,7 @@ def test_rejects_short_image(image: bytes, length: int) -> None:
         Database.unpack(image[:length])
 
 
-@pytest.mark.parametrize("seed", range(20))
+@together("seed", range(20))
 def test_detects_any_flipped_bit(image: bytes, seed: int) -> None:
     rng = np.random.default_rng(seed)
     damaged = bytearray(image)

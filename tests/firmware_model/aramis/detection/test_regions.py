@@ -17,6 +17,7 @@ from cubestack.firmware_model.aramis.detection.regions import MOST_RUNS, find_re
 from cubestack.firmware_model.aramis.field import CameraField
 from cubestack.firmware_model.aramis.solution import StarList
 from cubestack.host.studies.aramis.sky import meter
+from tests.together import together
 
 TOUCHING = np.ones((3, 3))
 
@@ -28,8 +29,8 @@ def stars(picture: NDArray[np.uint8], mask: NDArray[np.bool_], **limits: int) ->
     return locate_stars(picture, regions, **settings)
 
 
-@pytest.mark.parametrize("floor", [0, 20])
-@pytest.mark.parametrize("seed", range(10))
+@together("floor", [0, 20])
+@together("seed", range(10))
 def test_centroids_are_weighted_means(seed: int, floor: int) -> None:
     rng = np.random.default_rng(seed)
     picture = rng.integers(0, 256, (40, 50)).astype(np.uint8)
@@ -160,9 +161,9 @@ def slowly(mask: Mask, method: SpikeRemoval, needed: int) -> Mask:
     return result
 
 
-@pytest.mark.parametrize("method", [SpikeRemoval.CENTRE, SpikeRemoval.WINDOW])
-@pytest.mark.parametrize("shape", SHAPES)
-@pytest.mark.parametrize("needed", [1, 8, HALF, 25])
+@together("method", [SpikeRemoval.CENTRE, SpikeRemoval.WINDOW])
+@together("shape", SHAPES)
+@together("needed", [1, 8, HALF, 25])
 def test_spike_filter_equals_a_window_by_window_reference(
     method: SpikeRemoval, shape: tuple[int, int], needed: int
 ) -> None:

@@ -32,6 +32,7 @@ from cubestack.host.studies.aramis.sky import (
     pictures,
 )
 from cubestack.host.studies.aramis.stars_alone import COARSE, outcomes
+from tests.together import together
 
 NOISY = replace(COARSE, noise_px=1.0)
 PROFILES = pytest.mark.parametrize("profile", [PUBLISHED.profile, VERIFIED.profile])
@@ -280,7 +281,7 @@ def solutions(body: Array, inertial: Array) -> Array:
     return np.array([quest(*arguments, meter(), eigenvalue=e) for e in (largest_eigenvalue, None)])
 
 
-@pytest.mark.parametrize("seed", range(50))
+@together("seed", range(50))
 def test_quartic_is_the_characteristic_polynomial(seed: int) -> None:
     made = profile(np.random.default_rng(seed), 4, 0.5)
     square, linear, constant = quartic(made.astype(np.float32), meter())
@@ -288,7 +289,7 @@ def test_quartic_is_the_characteristic_polynomial(seed: int) -> None:
     np.testing.assert_allclose([1, 0, square, linear, constant], expected, atol=2e-6)
 
 
-@pytest.mark.parametrize("seed", range(50))
+@together("seed", range(50))
 def test_contradicting_vectors_lower_the_largest_eigenvalue(seed: int) -> None:
     made = profile(np.random.default_rng(seed), 5, 0.3)
     expected = np.linalg.eigvalsh(davenport(made))[-1]
@@ -296,7 +297,7 @@ def test_contradicting_vectors_lower_the_largest_eigenvalue(seed: int) -> None:
     assert largest_eigenvalue(made.astype(np.float32), meter()) == pytest.approx(expected, abs=2e-5)
 
 
-@pytest.mark.parametrize("seed", range(50))
+@together("seed", range(50))
 def test_largest_eigenvalue_of_stars_of_one_field_is_1(seed: int) -> None:
     """Their two largest roots are so close that a rounding error taken for a step would cost
     degrees of roll."""
@@ -309,7 +310,7 @@ def test_largest_eigenvalue_of_stars_of_one_field_is_1(seed: int) -> None:
     np.testing.assert_array_equal(*solutions(body, inertial))
 
 
-@pytest.mark.parametrize("seed", range(50))
+@together("seed", range(50))
 def test_quest_with_the_quartic_solves_wahbas_problem(seed: int) -> None:
     """With vectors that agree within degrees, where a root of 1 would be wrong."""
     rng = np.random.default_rng(seed)

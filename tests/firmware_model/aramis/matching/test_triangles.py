@@ -17,6 +17,7 @@ from cubestack.firmware_model.interface.aramis import Reason
 from cubestack.host.studies.aramis.sky import FIELD, Light, database, meter, pictures
 from cubestack.host.studies.aramis.stars_alone import LISTED, PRINTED
 from tests.tiers import quick
+from tests.together import together
 
 Array = NDArray[Any]
 
@@ -40,7 +41,7 @@ def measure(corners: Array, sigma: float = 1e-4) -> Triangle:
     return measure_triangle(corners.astype(np.float32), sigma, meter())
 
 
-@pytest.mark.parametrize("seed", range(100))
+@together("seed", range(100))
 def test_triangle_area_and_moment_match_double_precision(seed: int) -> None:
     (corners,) = in_field(np.random.default_rng(seed))
     triangle = measure(corners)
@@ -63,7 +64,7 @@ def test_triangle_moment_is_the_second_moment_of_its_area() -> None:
     assert area * mean == pytest.approx(moment, rel=0.01)
 
 
-@pytest.mark.parametrize("seed", range(20))
+@together("seed", range(20))
 def test_triangle_sigmas_match_simulated_noise(seed: int) -> None:
     rng = np.random.default_rng(seed)
     sigma = 1e-4
@@ -127,8 +128,8 @@ def brightness(magnitudes: Vectors) -> Vectors:
     return (1000 * 10 ** (-0.4 * magnitudes)).astype(np.float32)
 
 
-@pytest.mark.parametrize("seed", range(10))
-@pytest.mark.parametrize("order", list(permutations(range(3))))
+@together("seed", range(10))
+@together("order", list(permutations(range(3))))
 def test_brightness_and_side_criteria_assign_the_same_order(
     seed: int, order: tuple[int, ...]
 ) -> None:

@@ -15,6 +15,7 @@ from cubestack.firmware_model.cubestar.detection import (
     SearchEnd,
     detect_stars,
 )
+from tests.together import together
 
 from ..sky import meter
 from .pictures import drawn, errors
@@ -121,7 +122,7 @@ def crowded(rng: np.random.Generator, rows: int, columns: int) -> NDArray[np.uin
     return picture
 
 
-@pytest.mark.parametrize("seed", range(60))
+@together("seed", range(60))
 def test_search_follows_the_literal_rules(seed: int) -> None:
     rng = np.random.default_rng(seed)
     rows, columns = int(rng.integers(12, 60)), int(rng.integers(12, 60))

@@ -13,6 +13,7 @@ from cubestack.firmware_model.cubestar.detection import (
 from cubestack.firmware_model.cubestar.detection.spots import ELECTRONS_PER_DN, HALF
 from cubestack.firmware_model.cubestar.detection.steep import along_rows, beside
 from cubestack.firmware_model.star_tracker.background import UNIT, SkyBackground
+from tests.together import together
 
 from ..sky import meter
 from .pictures import Places, spots, taken
@@ -79,7 +80,7 @@ def test_only_stars_are_found_beside_the_limb(angle_deg: float) -> None:
     assert np.count_nonzero(away.min(axis=0) > NEAR_PX) <= 1
 
 
-@pytest.mark.parametrize("angle_deg", range(0, 360, 20))
+@together("angle_deg", range(0, 360, 20))
 def test_earth_limb_yields_at_most_one_false_star(angle_deg: float) -> None:
     light, _ = limb(angle_deg + 7)
     found = detect_stars(taken(noisy(light, angle_deg)), CONFIG, meter())

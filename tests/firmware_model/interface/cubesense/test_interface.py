@@ -13,6 +13,7 @@ from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.firmware_model.interface.cubesense import INTERFACE, codes, service_port, telemetry
 from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
 from cubestack.firmware_model.interface.cubesense.telecommands import DISTORTION
+from tests.together import together
 
 LAYOUTS = """
 TC 0 1 u8 H
@@ -47,7 +48,7 @@ KNOWN = {
 BY_ID = {message.id: message for message in INTERFACE.messages}
 
 
-@pytest.mark.parametrize("number", KNOWN)
+@together("number", KNOWN)
 def test_cubesense_messages_have_the_known_layout(number: int) -> None:
     length, types, confidence = KNOWN[number]
     message = BY_ID[number]
@@ -102,7 +103,7 @@ def test_telemetry_encodes_to_the_published_bytes() -> None:
     assert (result.pack(**values), result.unpack(data)) == (data, values)
 
 
-@pytest.mark.parametrize(
+@together(
     ("name", "change", "wrong"),
     [
         ("CaptureOnly", {"Location": codes.ImageLocation.BOTTOM}, ["Location"]),

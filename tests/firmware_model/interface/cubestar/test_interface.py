@@ -11,6 +11,7 @@ import pytest
 
 from cubestack.firmware_model.interface.codec.field import Value
 from cubestack.firmware_model.interface.cubestar import INTERFACE, ImageBlockSize
+from tests.together import together
 
 PRINTED = Path(__file__).with_name("printed_layouts.txt").read_text(encoding="ascii")
 
@@ -21,7 +22,7 @@ STEPPING = {
 BY_ID = {message.id: message for message in INTERFACE.messages}
 
 
-@pytest.mark.parametrize("entry", re.split(r"\n(?=\d)", PRINTED.strip()))
+@together("entry", re.split(r"\n(?=\d)", PRINTED.strip()))
 def test_cubestar_messages_have_the_printed_layout(entry: str) -> None:
     number, name, length, *fields = entry.split()
     message = BY_ID[int(number)]

@@ -4,11 +4,10 @@ vector table, and the device header of the simulator's test programs, which is o
 import re
 from pathlib import Path
 
-import pytest
-
 from cubestack.firmware_model.interface.efm32gg import LAYOUTS, register_at
 from cubestack.firmware_model.interface.efm32gg.c_header import c_header
 from cubestack.firmware_model.interface.efm32gg.table import Instance, peripheral
+from tests.together import together
 
 #: EFM32GG Reference Manual, figure 5.2 (memory map); the device information is in table 5.4.
 BASES = {
@@ -69,9 +68,7 @@ def structs() -> dict[str, list[tuple[str, int]]]:
     return found
 
 
-@pytest.mark.parametrize(
-    ("kind", "address"), re.findall(r"#define \w+ \(\((\w+) \*\)(0x4\w+)UL\)", TEXT)
-)
+@together(("kind", "address"), re.findall(r"#define \w+ \(\((\w+) \*\)(0x4\w+)UL\)", TEXT))
 def test_efm32gg_registers_match_the_addresses_of_the_vendor_header(
     kind: str, address: str
 ) -> None:

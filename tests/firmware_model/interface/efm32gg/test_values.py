@@ -13,6 +13,7 @@ from cubestack.firmware_model.interface.efm32gg.table import (
     peripheral,
 )
 from cubestack.firmware_model.interface.efm32gg.values import value_names, with_values
+from tests.together import together
 
 FIELDS = {
     f"{layout.name}.{register.name}.{field.name}": field
@@ -27,12 +28,12 @@ def values(name: str) -> dict[str, int]:
     return {text: number for number, text in FIELDS[name].values}
 
 
-@pytest.mark.parametrize("pattern", [pattern for pattern, _ in value_names()])
+@together("pattern", [pattern for pattern, _ in value_names()])
 def test_line_names_values_of_a_field(pattern: str) -> None:
     assert any(field.values for name, field in FIELDS.items() if fnmatchcase(name, pattern))
 
 
-@pytest.mark.parametrize("pattern", [pattern for pattern, _ in value_names()])
+@together("pattern", [pattern for pattern, _ in value_names()])
 def test_line_is_not_hidden_by_an_earlier_one(pattern: str) -> None:
     own = dict(value_names())[pattern]
     found = [field for name, field in FIELDS.items() if fnmatchcase(name, pattern)]

@@ -12,6 +12,7 @@ from cubestack.host.studies.compare.attitude.smoothing import smooth
 from cubestack.host.studies.compare.attitude.trials import CASES, FRAMES, STEP_S, take_trial
 from cubestack.host.studies.compare.database import Catalogue
 from cubestack.host.studies.compare.tracker import Tracker
+from tests.together import together
 
 Vectors = NDArray[np.float64]
 
@@ -77,8 +78,8 @@ def test_exact_directions_give_the_exact_attitude(name: str, spread: float) -> N
     assert found == pytest.approx(attitude, abs=1e-9)
 
 
-@pytest.mark.parametrize("name", ["q-method", "SVD"])
-@pytest.mark.parametrize("seed", range(10))
+@together("name", ["q-method", "SVD"])
+@together("seed", range(10))
 def test_optimal_methods_are_the_optimum_in_double_precision(name: str, seed: int) -> None:
     rng = np.random.default_rng(seed)
     measured, listed, _ = _stars(rng, int(rng.integers(2, 12)), rng.uniform(0.05, 0.5), 1e-3)
@@ -86,8 +87,8 @@ def test_optimal_methods_are_the_optimum_in_double_precision(name: str, seed: in
     assert found == pytest.approx(_optimum(measured, listed), abs=1e-8)
 
 
-@pytest.mark.parametrize("name", OPTIMAL)
-@pytest.mark.parametrize("seed", range(10))
+@together("name", OPTIMAL)
+@together("seed", range(10))
 def test_optimal_methods_agree_within_single_precision(name: str, seed: int) -> None:
     measured, listed, _ = _stars(np.random.default_rng(seed), 6, 0.2, 1e-4)
     found = SOLVERS[name](measured.astype(np.float32), listed.astype(np.float32), _meter())

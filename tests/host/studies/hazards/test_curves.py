@@ -22,6 +22,7 @@ from cubestack.host.studies.hazards.curves import (
 from cubestack.host.studies.hazards.curves import run as run_jobs
 from cubestack.host.studies.rows.record import load, measurement, save
 from tests.conftest import Run
+from tests.together import together
 
 
 @pytest.mark.parametrize(("count", "of"), [(0, 20), (1, 20), (13, 40), (20, 20), (3, 1000)])
@@ -65,7 +66,7 @@ def test_dark_sky_is_refused_with_a_reason() -> None:
 DOCS = Path(__file__).parents[4] / "docs"
 
 
-@pytest.mark.parametrize("name", sorted(known()))
+@together("name", sorted(known()))
 def test_page_shows_each_hazard_for_each_device(name: str) -> None:
     page = (DOCS / PAGE).read_text("utf-8")
     (section,) = re.findall(rf"^## {name}\n(.*?)(?=^## |^<!--)", page, re.DOTALL | re.MULTILINE)

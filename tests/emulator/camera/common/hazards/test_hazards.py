@@ -20,6 +20,7 @@ from cubestack.emulator.scene.file import SceneError
 from cubestack.emulator.scene.sky import PictureScene, SkyScene
 from cubestack.firmware_model.interface.cameras.mt9m001 import REGISTERS
 from tests.emulator.scene.hazards.around import ORION, SHUTTER
+from tests.together import together
 
 DARK = replace(ORION, mag_limit=-5.0)
 CAMERAS = ("cubestar", "aramis")
@@ -58,8 +59,8 @@ def test_worst_strength_is_visible_and_repeatable(hazard: type[SensorHazard], ca
     assert np.mean(first != picture(camera)) > 1e-4
 
 
-@pytest.mark.parametrize("camera", CAMERAS)
-@pytest.mark.parametrize("name", sorted(HAZARDS.keys() - {"defocus", "response"}))
+@together("camera", CAMERAS)
+@together("name", sorted(HAZARDS.keys() - {"defocus", "response"}))
 def test_least_strength_has_no_effect(name: str, camera: str) -> None:
     hazard = HAZARDS[name]
     least = hazard.sample(hazard.strength.values[0], None, np.random.default_rng(1))
