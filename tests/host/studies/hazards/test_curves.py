@@ -137,6 +137,7 @@ def test_stale_curves_are_named(tmp_path: Path, run: Run, monkeypatch: pytest.Mo
 
 
 @pytest.mark.slow
+@pytest.mark.weekly
 @pytest.mark.parametrize("name", sorted(load(recorded.record_file(DOCS))))
 def test_curve_is_the_same_again(name: str) -> None:
     stored = load(recorded.record_file(DOCS))[name]
