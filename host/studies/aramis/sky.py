@@ -14,6 +14,7 @@ from cubestack.firmware_model.aramis.field import CameraField
 from cubestack.firmware_model.aramis.solution import NONE, Solution, StarList
 from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
 from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.host.experiments import attitude
 
 Array = NDArray[np.float64]
 
@@ -81,8 +82,8 @@ def within(points: Array, field: CameraField) -> NDArray[np.bool_]:
 def picture(rng: np.random.Generator, field: CameraField, light: Light | None = None) -> Picture:
     light = light or Light()
     sky = load_sky(mag_limit=light.mag_limit)
-    attitude = Rotation.random(random_state=rng)
-    camera = sky.vectors @ attitude.as_matrix().T
+    pose = Rotation.random(random_state=rng)
+    camera = sky.vectors @ pose.as_matrix().T
     ahead = camera[:, 2] > field.smallest_cosine - 1e-6
     points = project(camera[ahead], field)
     seen = within(points, field)
@@ -99,7 +100,7 @@ def picture(rng: np.random.Generator, field: CameraField, light: Light | None = 
     order = np.argsort(magnitudes)[: light.most]
     brightness = 500 * 10 ** (-0.4 * (magnitudes[order] - 6))
     stars = StarList(points[order].astype(np.float32), brightness.astype(np.float32))
-    return Picture(stars, attitude, hip[order].astype(np.int32))
+    return Picture(stars, pose, hip[order].astype(np.int32))
 
 
 def pictures(count: int, seed: int = 0, light: Light | None = None) -> list[Picture]:
@@ -116,8 +117,8 @@ def errors_deg(quaternion: NDArray[np.float32], truth: Rotation) -> tuple[float,
 
 
 def is_right(solution: Solution, truth: Rotation) -> bool:
-    cross, roll = errors_deg(solution.quaternion, truth)
-    return cross < 0.1 and roll < 0.3
+    found = solution.quaternion
+    return found is not None and attitude.is_right(*errors_deg(found, truth))
 
 
 def in_published_sense(solution: Solution, made: Picture, database: Database) -> bool:
