@@ -17,8 +17,12 @@ from cubestack.host.experiments.attitude import AttitudeResult
 from cubestack.host.experiments.hazard_options import Asked
 from cubestack.host.experiments.measure import measure
 from cubestack.host.experiments.rates import outcome, why_refused
+from cubestack.host.studies.rows.estimate import rate_of
+from cubestack.host.studies.rows.trial import Figures
 
 RECORD = "lens-errors.jsonl"  #: in ``docs/data``: a ``LensRow`` per line
+
+SEED = 11  #: of ``by_strength``
 
 SIGMAS = 4.0  #: claimed standard deviations about an axis that a believed attitude may be off
 
@@ -69,6 +73,19 @@ def is_outside(result: AttitudeResult) -> bool:
     """Whether the error about an axis exceeds the claim of a believed attitude."""
     sigmas, errors = result.sigma_deg or [], result.error_deg or []
     return any(abs(e) > SIGMAS * s for e, s in zip(errors, sigmas, strict=True))
+
+
+def by_strength(
+    _opened: object, frames: int, *, device: str, hazard: str, strengths: tuple[float, ...]
+) -> Figures:
+    """Right attitudes in % of the skies, and numbers of the others, by the strength of an error."""
+    figures = dict[str, float]()
+    for strength in strengths:
+        found = count(device, hazard, strength, frames, SEED)
+        figures[f"{strength:g} right"] = rate_of(found.right, found.skies)
+        for name in ("refused", "unmatched", "off", "outside"):
+            figures[f"{strength:g} {name}"] = getattr(found, name)
+    return figures
 
 
 @dataclass(frozen=True)

@@ -39,6 +39,7 @@ from cubestack.host.studies.cubestar.stars_alone import false_alarms, identifica
 from cubestack.host.studies.cubestar.variants import VARIANTS
 from cubestack.host.studies.fidelity.table import Fidelity, read_tables
 from cubestack.host.studies.hazards.overview import skies
+from cubestack.host.studies.lens_errors import by_strength
 from cubestack.host.studies.rows.estimate import average, rate, rate_of, resampled
 from cubestack.host.studies.rows.trial import Figures, Trial, measured, measured_in_turn
 from cubestack.host.studies.upsets.figures import upset_figures
@@ -307,6 +308,8 @@ _FOCAL = {
     for percent in (0.5, 1, 3)
 }
 
+_LENSES = {"lens-residuals": (0.2, 0.5, 1.0), "focal-length": (0.5, 1.0, 3.0)}
+
 #: For figures in the text of pages.
 _TEXT = {
     "limits": measured_in_turn(
@@ -326,6 +329,16 @@ _TEXT = {
     "turns": Trial(turns, 10, 3, 2),
     "identification": Trial(identification, 2000, 20, 20, profiles=False),
     "false alarms": Trial(false_alarms, 3000, 60, 12, profiles=False),
+    **{
+        name: Trial(
+            partial(by_strength, device="cubestar", hazard=name, strengths=strengths),
+            120,
+            2,
+            15,
+            profiles=False,
+        )
+        for name, strengths in _LENSES.items()
+    },
     "margins": Trial(margins, 200, 5, 20, profiles=False),
     "upsets": Trial(partial(upset_figures, experiment=upsets.EXPERIMENT), 8, 0, 90, profiles=False),
     "skies": skies("cubestar", {"bright": {"mag_limit": 3.8}, **_FALSE, **_FOCAL}),

@@ -4,7 +4,15 @@ from typing import Any
 
 import pytest
 
-from cubestack.host.studies.lens_errors import RECORD, SIGMAS, LensCount, count, counted, rows
+from cubestack.host.studies.lens_errors import (
+    RECORD,
+    SIGMAS,
+    LensCount,
+    by_strength,
+    count,
+    counted,
+    rows,
+)
 
 DOCS = Path(__file__).parents[3] / "docs"
 
@@ -40,6 +48,13 @@ def test_page_shows_the_recorded_rows_and_no_other() -> None:
         number = one.count
         assert number.skies == 250 * len(one.seeds)
         assert number.right + number.refused + number.unmatched + number.off == number.skies
+
+
+def test_each_strength_is_counted_on_the_same_skies() -> None:
+    found = by_strength(None, 3, device="cubestar", hazard="pixel-aspect", strengths=(0.0, 5.0))
+    assert found["0 right"] == 100
+    assert found["5 right"] == 0
+    assert found["5 unmatched"] + found["5 refused"] + found["5 off"] == 3
 
 
 def test_no_recorded_wrong_lens_was_believed_outside_of_the_claim() -> None:
