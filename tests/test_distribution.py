@@ -18,6 +18,7 @@ def files_of_the_clone() -> set[str]:
     return {name for name in found.split("\0") if name and (ROOT / name).is_file()}
 
 
+@pytest.mark.slow
 def test_source_distribution_has_every_file(tmp_path: Path) -> None:
     files = files_of_the_clone()
     if not files:

@@ -58,6 +58,7 @@ def on_macos(*words: str) -> "subprocess.CompletedProcess[str]":
     return subprocess.run(call, capture_output=True, text=True, timeout=300)
 
 
+@pytest.mark.slow
 def test_modules_import_and_a_device_runs_on_macos() -> None:
     done = on_macos("shell", "emulated:cubesense", "-c", "read Power")
     assert done.returncode == 0, done.stderr

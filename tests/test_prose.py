@@ -33,5 +33,6 @@ def test_prose_check_ignores_code(path: str, text: str) -> None:
     assert not [*prose.hits(path, text)]
 
 
+@pytest.mark.slow
 def test_repository_has_no_prose_hits(capsys: pytest.CaptureFixture[str]) -> None:
     assert prose.main() == 0, capsys.readouterr().out

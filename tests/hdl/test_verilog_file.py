@@ -74,6 +74,7 @@ def core(component: CubeStarTop, name: str) -> str:
     return re.sub(r"\bx_core\b", name, text[text.index("module x_core") :])
 
 
+@pytest.mark.slow
 def test_verilog_core_passes_the_store_and_read_testbenches(icarus: Any) -> None:
     """The benches of the design, on the file's text; it has no initial values either."""
     icarus.run(CubeStarTop, 8, 4, *modules(STAR, "store", "read"), seed=1, text=core)

@@ -76,7 +76,7 @@ def exported(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.skipif(not have_yosys(), reason="no whole Yosys")
-@pytest.mark.parametrize(("file", "turn"), quick([(f, n) for f in FILES for n in range(4)], 2))
+@pytest.mark.parametrize(("file", "turn"), quick([(f, n) for f in FILES for n in range(4)], 1))
 def test_exported_verilog_does_not_change_the_run(file: str, turn: int, exported: Path) -> None:
     """But for the recording's header, which names the file, and the registers' order.
 
@@ -127,7 +127,7 @@ def test_rewritten_verilog_of_the_pair_does_not_change_the_run(
     assert pair_life(seed, gateware, rewritten_pair(gateware)) == pair_life(seed, gateware)
 
 
-@pytest.mark.parametrize("turn", quick(range(16), 3))
+@pytest.mark.parametrize("turn", quick(range(16), 2))
 def test_strides_do_not_change_the_run(turn: int) -> None:
     seed = todays(turn, 16, 200)
     with_strides, exact = life(seed, strides=True), life(seed, strides=False)

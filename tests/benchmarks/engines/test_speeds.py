@@ -13,6 +13,7 @@ from tests.benchmarks.engines.icarus import CocotbError, missing_for_cocotb, run
 from tests.benchmarks.engines.speeds import ENGINES, absent, measure
 from tests.benchmarks.engines.verilated import verilator_root
 from tests.benchmarks.engines.workloads import WORKLOADS, WrongPictureError
+from tests.tiers import quick
 
 
 @pytest.mark.slow
@@ -27,7 +28,7 @@ def test_every_wired_top_has_a_workload():
         assert {*workload.stored.values()} <= {memory.name for memory in wiring.memories}
 
 
-@pytest.mark.parametrize("name", WORKLOADS)
+@pytest.mark.parametrize("name", quick(WORKLOADS, 2))
 def test_simulator_stores_the_sample(name):
     load = WORKLOADS[name]
     engine = make_engine(load.wiring(), "python", skipping=False)

@@ -91,15 +91,15 @@ BLOCKS: dict[str, Callable[[ReadOut], Component]] = {
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-@pytest.mark.parametrize("block", BLOCKS)
+@pytest.mark.parametrize("block", quick(BLOCKS, 2))
 def test_cubesense_block_passes_its_testbench(
     simulate: Any, read_out: ReadOut, block: str, seed: int
 ) -> None:
     simulate(BLOCKS[block], read_out, block, name=block, seed=seed)
 
 
-@pytest.mark.parametrize("addressing", [False, True], ids=["published", "addressing"])
-@pytest.mark.parametrize("side", ["sun", "nadir"])
+@pytest.mark.parametrize("addressing", quick([False, True], 1), ids=["published", "addressing"])
+@pytest.mark.parametrize("side", quick(["sun", "nadir"], 1))
 def test_dataflow_block_passes_its_testbench(simulate: Any, side: Any, addressing: bool) -> None:
     options = {"mcu_addressing": addressing, "side": side, "seed": 1}
     options["name"] = f"{side}_dataflow_{addressing}"
@@ -107,7 +107,7 @@ def test_dataflow_block_passes_its_testbench(simulate: Any, side: Any, addressin
     simulate(lambda _: make(), ReadOut(), "dataflow", **options)
 
 
-@pytest.mark.parametrize("side", ["sun", "nadir"])
+@pytest.mark.parametrize("side", quick(["sun", "nadir"], 1))
 def test_single_fpga_passes_its_testbench(simulate: Any, read_out: ReadOut, side: Any) -> None:
     options = {"name": f"{side}_fpga", "side": side, "seed": 1}
     simulate(partial(CubeSenseFpga, side), read_out, "fpga_alone", **options)

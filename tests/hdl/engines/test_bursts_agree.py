@@ -71,7 +71,7 @@ def suits(wiring: Wiring, at: dict[str, int], burst: tuple[tuple[str, int], ...]
     return all((wiring.initial | at)[pin] == level for pin, level in burst)
 
 
-@pytest.mark.parametrize("name", quick(WORKLOADS, 2))
+@pytest.mark.parametrize("name", quick(WORKLOADS, 1))
 def test_benchmark_workloads_run_in_single_clock_steps(name: str) -> None:
     """The levels have a copy of their own, of which each camera's share of an edge is known."""
     wiring, load = BOARDS[name].wiring(False), WORKLOADS[name]

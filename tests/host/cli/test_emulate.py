@@ -61,6 +61,7 @@ def test_serves_a_pty_and_records_the_session(tmp_path: Path) -> None:
     assert recording.sent("uart", "host")[0]
 
 
+@pytest.mark.slow
 def test_several_devices_share_a_bus_and_have_their_own_ports() -> None:
     with serving("cubestar", "cubesense", "--tcp", "0", "--i2c", BUS, last="CubeSense") as said:
         (star,), (sense, bench) = ports(said, "CubeStar"), ports(said, "CubeSense")

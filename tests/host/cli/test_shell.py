@@ -169,7 +169,7 @@ def test_emulated_device_runs_the_commands(emulated):
     assert "near: " in err
 
 
-@pytest.mark.parametrize("kind", quick_ones(KINDS, "tcp", "i2c"))
+@pytest.mark.parametrize("kind", quick_ones(KINDS, "tcp"))
 def test_every_kind_of_target_and_its_recording_give_the_same_output(
     run, emulated, tmp_path, monkeypatch, kind
 ):

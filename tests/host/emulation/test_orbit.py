@@ -43,6 +43,7 @@ def scene_of(device: Any) -> Any:
     return device.scene.scene if isinstance(device.scene, View) else device.scene
 
 
+@pytest.mark.slow
 def test_scenes_follow_the_orbit(satellite: tuple[Any, Any, Any]) -> None:
     orbit, star, sense = satellite
     assert "an orbit moves" in star.follows

@@ -10,6 +10,7 @@ from cubestack.firmware_model.interface.cubesense.codes import Camera, CaptureRe
 from cubestack.host.clients.cubesense.client import Measurement
 from cubestack.host.emulation.emulated import AnyEmulated
 from tests.system.conftest import Open
+from tests.tiers import quick
 
 from .conftest import FACING
 
@@ -53,7 +54,7 @@ def test_every_iteration_measures_the_current_second(
             assert np.hypot(*off) < 1.5
 
 
-@pytest.mark.parametrize("scene", [EarthSunScene(), TURNING], ids=["still", "turning"])
+@pytest.mark.parametrize("scene", quick([EarthSunScene(), TURNING], 1), ids=["still", "turning"])
 def test_emulation_is_faster_than_real_time(session: Open, scene: EarthSunScene) -> None:
     with session(scene) as opened:
         loop(opened, True, 1)

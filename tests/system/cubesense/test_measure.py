@@ -105,6 +105,7 @@ def test_same_seed_gives_the_same_results(measure: Measure) -> None:
     assert first == second
 
 
+@pytest.mark.slow
 def test_other_memory_returns_the_same_directions(measure: Measure) -> None:
     own, other = (measure("--memory", memory, "--seed", 4) for memory in ("own", "other"))
     for one, another in zip(own, other, strict=True):

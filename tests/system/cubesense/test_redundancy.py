@@ -22,6 +22,7 @@ from cubestack.firmware_model.interface.cubesense.codes import (
 from cubestack.host.clients.cubesense.client import Measurement
 from cubestack.host.clients.cubesense.download import download_image, picture_of
 from tests.system.conftest import Open
+from tests.tiers import quick
 
 from .conftest import FACING, check_right, held, sent
 
@@ -42,7 +43,7 @@ def latch_up(opened: Any, memory: Sram) -> None:
     opened.client.client.pause(0.1)
 
 
-@pytest.mark.parametrize("failed", Sram)
+@pytest.mark.parametrize("failed", quick(Sram, 1))
 def test_both_cameras_measure_with_one_memory_failed(opened: Any, failed: Sram) -> None:
     latch_up(opened, failed)
     assert opened.client.power().over_current[failed]
@@ -55,7 +56,7 @@ def test_both_cameras_measure_with_one_memory_failed(opened: Any, failed: Sram) 
         assert lost.detect is codes.DetectResult.NONE_SCHEDULED
 
 
-@pytest.mark.parametrize("dead", Camera)
+@pytest.mark.parametrize("dead", quick(Camera, 1))
 def test_camera_measures_with_the_other_camera_and_its_own_memory_failed(
     opened: Any, dead: Camera
 ) -> None:
@@ -87,7 +88,7 @@ def test_half_measures_alone_while_the_other_fpga_is_dead(
         check(opened.client.capture_and_detect(dead, Sram(dead)), CaptureResult.STORED_OWN_SRAM)
 
 
-@pytest.mark.parametrize("camera", Camera)
+@pytest.mark.parametrize("camera", quick(Camera, 1))
 def test_image_in_the_other_memory_equals_the_camera_image(opened: Any, camera: Camera) -> None:
     other = Sram(1 - camera)
     opened.client.capture(camera, other)
@@ -115,7 +116,7 @@ def test_only_as_printed_gateware_keeps_sun_coordinates_without_a_sun(
         assert first == (seen if gateware == "both-searches" else fpga.SUN_NOT_FOUND)
 
 
-@pytest.mark.parametrize("camera", Camera)
+@pytest.mark.parametrize("camera", quick(Camera, 1))
 def test_single_search_gateware_gives_the_same_direction(ready: Open, camera: Camera) -> None:
     other, found, took_s = Sram(1 - camera), {}, {}
     for gateware in ("one-search", "corrected"):

@@ -154,6 +154,7 @@ def test_time_is_paused_stepped_and_resumed(page: Any) -> None:
     page.wait_for_selector("#pause[aria-pressed=false]")
 
 
+@pytest.mark.slow
 def test_back_returns_to_a_snapshot(page: Any) -> None:
     look(page, "CubeSense")
     line(page, "write DetectionThreshold1 7")

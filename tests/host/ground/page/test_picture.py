@@ -20,6 +20,7 @@ GREEN = (
 """Counts the green pixels drawn over the picture."""
 
 
+@pytest.mark.slow
 def test_page_shows_the_captured_image(page: Any) -> None:
     page.select_option("#command", "CaptureAndProcess")
     page.click("#send")
@@ -38,6 +39,7 @@ def test_page_shows_the_captured_image(page: Any) -> None:
     )
 
 
+@pytest.mark.slow
 def test_found_edges_are_drawn(page: Any) -> None:
     look(page, "CubeSense")
     page.wait_for_selector("#attitude-status >> text=CubeSense reports no attitude")

@@ -74,6 +74,7 @@ def relayed() -> Iterator[tuple[Relay, str]]:
         relay.close()
 
 
+@pytest.mark.slow
 def test_page_reconnects(chromium: Any, relayed: tuple[Relay, str]) -> None:
     relay, address = relayed
     with shown(chromium, address) as page:

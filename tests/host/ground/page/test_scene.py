@@ -70,6 +70,7 @@ def point(page: Any, right: float, down: float) -> None:
     page.hover("#sky-map", position=place(page, right, down))
 
 
+@pytest.mark.slow
 def test_click_and_drag_set_the_pointing(page: Any) -> None:
     click(page, 0, 0)
     told(page, "/camera (0.0|360.0)° -?0.0°/")
@@ -89,6 +90,7 @@ def test_click_and_drag_set_the_pointing(page: Any) -> None:
     assert value(page, "ra_deg") == before
 
 
+@pytest.mark.slow
 def test_keys_set_the_pointing_of_the_emulation(page: Any) -> None:
     fill(page, "ra_deg", "100")
     fill(page, "dec_deg", "10")

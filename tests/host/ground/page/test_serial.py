@@ -36,6 +36,7 @@ def cell(page: Any, field: str) -> Any:
     return page.locator("#telemetry tr", has=page.locator(f"th >> text=/^{field}$/")).locator("td")
 
 
+@pytest.mark.slow
 def test_live_values_are_read_over_the_line(chromium: Any, tmp_path: Path, recorded: Any) -> None:
     with (
         cable(tmp_path / "ours", tmp_path / "theirs", recorded),

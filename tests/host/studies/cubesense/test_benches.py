@@ -32,6 +32,7 @@ def test_lamp_swings_three_times_in_an_image_and_alike_along_rows() -> None:
     assert not np.array_equal(field, other)
 
 
+@pytest.mark.slow
 @compiled
 def test_ball_partly_out_of_the_field_is_worse_as_published_alone(
     monkeypatch: pytest.MonkeyPatch,
@@ -45,6 +46,7 @@ def test_ball_partly_out_of_the_field_is_worse_as_published_alone(
     assert found["extended"]["offset_60"] < 0.1
 
 
+@pytest.mark.slow
 @compiled
 def test_a_camera_that_shakes_scatters_more(monkeypatch: pytest.MonkeyPatch) -> None:
     kept = {name: benches.CAUSES[name] for name in ("shake25", "shake75")}

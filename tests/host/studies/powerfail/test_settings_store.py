@@ -100,6 +100,7 @@ def test_planted_mistake_is_found(images: Images, fault: int, verdict: str) -> N
     assert found.second == (fault == UNSAFE_RECOVERY)
 
 
+@pytest.mark.slow
 def test_the_bare_part_runs_the_same_scenario(images: Images) -> None:
     options = {"serial": "usart1@PD0,PD1"}
     bare = replace(Scenario.read(SCENARIO), device="efm32gg", options=options)

@@ -129,7 +129,8 @@ def test_triple_voted_counter_is_immune(voted: None) -> None:
     assert {result.answer for result in results} == {"right"}
 
 
-@pytest.mark.parametrize("layout", quick(["2", "3", "two-boards"], 1))
+@pytest.mark.slow
+@pytest.mark.parametrize("layout", ["2", "3", "two-boards"])
 def test_each_layout_has_its_registers(layout: str) -> None:
     results = measured(
         *("cubestar", cubestar.EXPERIMENT),
