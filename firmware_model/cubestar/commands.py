@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from cubestack.firmware_model.cubestar.body_list import Body
 from cubestack.firmware_model.cubestar.link import TASKS
 from cubestack.firmware_model.cubestar.processing.chain import Processing
 from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
@@ -43,6 +44,7 @@ class Commands(CommandExecutor):
             "SaveConfig": lambda _: self.state.save_config(),
             "ClearConfig": lambda _: self.state.erase_config(),
             "StopLoop": self._stop_loop,
+            "SetBody": self._list_body,
         }
         sensor = self._capture.sensor
         self._routines |= {
@@ -166,6 +168,11 @@ class Commands(CommandExecutor):
     def _set_hint(self, _command: QueuedCommand) -> None:
         self.state.retained.hint_present = 1
         self.processing.transitions.hinted()
+
+    def _list_body(self, command: QueuedCommand) -> None:
+        bodies, uptime_us = self.state.bodies, self.state.hardware.uptime_us()
+        bodies[command.values["Number"]] = Body.of_command(command.values, uptime_us, self._meter)
+        self.state.bodies = bodies
 
     # --- loop ---------------------------------------------------------------------------------
 

@@ -80,6 +80,10 @@ class ImageMemory(ABC):
         values = yield from self._reads(np.arange(start, start + count, dtype=np.int32))
         return values.tobytes()
 
+    def sample(self, offsets: NDArray[np.int32]) -> Routine[NDArray[np.uint8]]:
+        """Single pixels, one after the other."""
+        return (yield from self._reads(offsets))
+
     def write(self, start: int, data: NDArray[np.uint8]) -> Routine[None]:
         yield from self._writes(np.arange(start, start + len(data), dtype=np.int32), data)
 

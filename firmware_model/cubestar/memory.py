@@ -20,7 +20,13 @@ from cubestack.firmware_model.cubestar.earlier_stars import EarlierStars
 from cubestack.firmware_model.cubestar.link import SEND_BUFFER_BYTES
 from cubestack.firmware_model.cubestar.matching.pair_triangles import MOST_PAIRS
 from cubestack.firmware_model.cubestar.matching.voting import CUT_RADIUS_DEG
-from cubestack.firmware_model.cubestar.state import ATTITUDE_PAGE, CONFIG_PAGE, MODE_PAGE, State
+from cubestack.firmware_model.cubestar.state import (
+    ATTITUDE_PAGE,
+    BODIES_PAGE,
+    CONFIG_PAGE,
+    MODE_PAGE,
+    State,
+)
 from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
 from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES, INTERFACE
 from cubestack.firmware_model.interface.cubestar.telecommands import MOST_STARS
@@ -102,7 +108,7 @@ def budget(catalogue: StarCatalogue) -> tuple[Buffer, ...]:
         Buffer("pair list", Memory.FLASH, catalogue.pair_bytes),
         *(
             Buffer(f"page {page}", Memory.FLASH, FLASH_PAGE_BYTES)
-            for page in (CONFIG_PAGE, ATTITUDE_PAGE, MODE_PAGE)
+            for page in (CONFIG_PAGE, ATTITUDE_PAGE, MODE_PAGE, BODIES_PAGE)
         ),
         Buffer("settings, flags and counters", Memory.RETENTION, State.RETENTION_SIZE - kept),
         Buffer("stars of the image before", Memory.RETENTION, kept),

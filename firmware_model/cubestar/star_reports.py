@@ -133,14 +133,14 @@ class StarReports:
     def _inertial_vector(self, star: int) -> Values:
         identity, _, confidence = self._match(star)
         return {
-            **by_name(("ViX", "ViY", "ViZ"), self._processing.catalogue.vectors[identity]),
+            **by_name(("ViX", "ViY", "ViZ"), self._processing.known.vectors[identity]),
             "Identity": identity,
             "Confidence": 100 * confidence,
         }
 
     def _hipparcos(self, star: int) -> Values:
         return {
-            "Hipparcos": int(self._processing.catalogue.hip[self._match(star)[0]]),
+            "Hipparcos": int(self._processing.known.hip[self._match(star)[0]]),
             **by_name(("X", "Y"), self._detection.centroids[star]),
         }
 
@@ -164,7 +164,7 @@ class StarReports:
             return _empty_frame(f"Star{number}Details")
         star, prefix = self._results.best[number - 1], f"S{number}"
         identity, _, confidence = self._match(star)
-        inertial = self._processing.catalogue.vectors[identity]
+        inertial = self._processing.known.vectors[identity]
         return {
             **by_name((f"{prefix}CentX", f"{prefix}CentY"), self._detection.centroids[star]),
             f"{prefix}Mag": self._detection.intensities[star],

@@ -18,6 +18,7 @@ from io import BytesIO
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.firmware_model.cubestar.body_list import Body, pack_bodies, read_bodies
 from cubestack.firmware_model.cubestar.earlier_stars import EarlierStars
 from cubestack.firmware_model.cubestar.hardware import CubeStarHardware
 from cubestack.firmware_model.interface.codec import attitude_quality, switch_messages
@@ -56,6 +57,7 @@ _SETTINGS_BYTES = sum(INTERFACE.telecommand(name).length for name in SETTING_COM
 CONFIG_PAGE = "config"
 ATTITUDE_PAGE = "attitude"
 MODE_PAGE = "mode"
+BODIES_PAGE = "bodies"
 
 FLASH_ENDURANCE = 20_000  #: erasures per page: chosen, from the data sheet of the EFM32GG280
 
@@ -199,6 +201,7 @@ class State(NodeState):
             self.candidate = candidate if candidate.matched else None
             self.earlier = EarlierStars.unpack(data.read())
         else:
+            hardware.flash.erase(BODIES_PAGE)
             self.load_config()
 
     def retain(self) -> None:
@@ -225,6 +228,7 @@ class State(NodeState):
         self.retained = Retained(cut=self.retained.cut)
         self.quality, self.candidate = dict(UNRATED), None
         self.earlier = EarlierStars()
+        self.hardware.flash.erase(BODIES_PAGE)
         self.flags.clear()
         self.switches.forget()
         self.load_config()
@@ -249,6 +253,15 @@ class State(NodeState):
     @attitude.setter
     def attitude(self, attitude: Attitude) -> None:
         self._write(ATTITUDE_PAGE, attitude.pack())
+
+    @property
+    def bodies(self) -> list[Body]:
+        """Planets and Moon as listed by the host, in flash; each assignment writes them."""
+        return read_bodies(self.hardware.flash.read(BODIES_PAGE))
+
+    @bodies.setter
+    def bodies(self, bodies: list[Body]) -> None:
+        self._write(BODIES_PAGE, pack_bodies(bodies))
 
     def _write(self, page: str, data: bytes) -> None:
         if self.switches.now.flash_store == "nothing":

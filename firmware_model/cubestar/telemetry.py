@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from cubestack.firmware_model.attitude.geometry import angles_of
 from cubestack.firmware_model.attitude.quest import dcm
 from cubestack.firmware_model.cubestar.commands import Commands
+from cubestack.firmware_model.cubestar.processing.bodies import NO_BODIES
 from cubestack.firmware_model.cubestar.processing.gyro import NO_RATE
 from cubestack.firmware_model.cubestar.star_reports import StarReports, Values, by_name
 from cubestack.firmware_model.cubestar.state import Attitude
@@ -139,6 +140,7 @@ class Telemetry:
             "PerformanceParameters": self._performance,
             "Results": self._counts,
             "Quality": lambda: state.quality,
+            "Bodies": lambda: processing.results.bodies or NO_BODIES,
             "StellarGyro": lambda: processing.results.rate or NO_RATE,
             SHOWN: lambda: shown_values(state.switches.now),
             **self._stars.sources,

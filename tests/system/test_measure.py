@@ -22,7 +22,7 @@ KEYS = {
     "solved", "right", "centroids", "matched", "wrong", "mode", "error_cross_deg",
     "error_roll_deg", "truth", "quaternion", "phase_ms", "wall_ms", "status", "threshold",
     "searched", "profile", "reason", "false_alarm", "sigma_deg", "error_deg",
-    "rate_deg_s", "rate_sigma_deg_s", "rate_error_deg_s",
+    "rate_deg_s", "rate_sigma_deg_s", "rate_error_deg_s", "planets", "disc",
 }  # fmt: skip
 PHASES = {"idle", "discard", "capture", "transfer", "detect", "match", "attitude"}
 
@@ -172,3 +172,18 @@ def test_stellar_gyro_measures_the_rate_of_a_turning_sky(measure: Measure) -> No
         assert 0 < frame["rate_sigma_deg_s"][0] < 0.01
     (off, *_) = measure("--mag-limit", 3.8, "--turning", 0.3)
     assert off["rate_deg_s"] is None
+
+
+def test_listed_planets_are_named_and_a_wrong_moon_is_refused(measure: Measure) -> None:
+    options = ("--mag-limit", 3.8, "--frames", 4, "--seed", 1)
+    planets = measure(
+        *options, "--hazard", "planets", "--set", "bodies=on", "--profile", "extended"
+    )
+    assert all(frame["right"] for frame in planets)
+    assert sum(frame["planets"] for frame in planets) >= 3
+    off, on = (
+        measure(*options, "--hazard", "moon", "--set", f"bodies={value}") for value in ("off", "on")
+    )
+    assert [frame["disc"] for frame in off] == [None] * 4
+    assert any(frame["solved"] and not frame["right"] for frame in off)
+    assert not any(frame["solved"] and not frame["right"] for frame in on)

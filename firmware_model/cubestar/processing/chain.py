@@ -12,11 +12,13 @@ import numpy as np
 from cubestack.firmware_model.attitude.geometry import undistort, unit_vectors
 from cubestack.firmware_model.attitude.quest import AttitudeError, dcm
 from cubestack.firmware_model.cubestar import configuration, phases
+from cubestack.firmware_model.cubestar.body_list import PAGE_BYTES, Body
 from cubestack.firmware_model.cubestar.capture import ImageCapture
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.cubestar.detection import SearchEnd
+from cubestack.firmware_model.cubestar.detection.disc import find_disc
 from cubestack.firmware_model.cubestar.matching.identification import Identification
-from cubestack.firmware_model.cubestar.processing import estimate
+from cubestack.firmware_model.cubestar.processing import bodies, estimate
 from cubestack.firmware_model.cubestar.processing.estimate import Estimate, by_errors, by_votes
 from cubestack.firmware_model.cubestar.processing.gyro import measure_rate
 from cubestack.firmware_model.cubestar.processing.identify import (
@@ -27,7 +29,8 @@ from cubestack.firmware_model.cubestar.processing.identify import (
 )
 from cubestack.firmware_model.cubestar.processing.transitions import Automatic, transitions_of
 from cubestack.firmware_model.cubestar.state import UNRATED, Attitude, State
-from cubestack.firmware_model.interface.cubestar.codes import Reason, TaskStatus
+from cubestack.firmware_model.interface.cubestar.codes import Disc, Reason, TaskStatus
+from cubestack.firmware_model.interface.cubestar.extensions import MOST_BODIES
 from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitches
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import ReadTimer, Routine
@@ -158,11 +161,17 @@ class Processing:
             return self._fail(TaskStatus.IDENTIFICATION_FAILED, "StatusError")
         self.state.task_status = TaskStatus.IDENTIFYING
         started_us: int = yield ReadTimer()
+        listed = yield from self._list_bodies()
+        results = self.results
         with self._cycles():
             results.mode = self.transitions.choose()
-            searches = Searches(self.state, self.catalogue, self.meter)
+            searches = Searches(self.state, self.known, self.meter)
             identification = searches.run(results, self.transitions.cone_deg())
         self._record("identification", (yield from phases.end(self.state, "match_us", started_us)))
+        if listed:
+            results.bodies = (results.bodies or bodies.NO_BODIES) | bodies.summary(
+                results.frame, listed, self.known, identification
+            )
         if identification.outcome is not MatchOutcome.IDENTIFIED:
             searches.explain(results, identification)
             self.transitions.failed(results.mode)
@@ -211,8 +220,11 @@ class Processing:
         attitude = Attitude(
             found.quaternion, results.frame, results.image_ms, found.stars, results.mode, stored
         )
-        believed = not found.is_refused and self.transitions.believes(
-            attitude, identification.false_alarm
+        contradicted = self._moon_contradicts(found)
+        believed = (
+            not found.is_refused
+            and not contradicted
+            and self.transitions.believes(attitude, identification.false_alarm)
         )
         self._record("attitude", (yield from phases.end(self.state, "attitude_us", started_us)))
         if found.rating is not None:
@@ -221,6 +233,8 @@ class Processing:
                 reason = Reason.LENS
                 self.transitions.failed(results.mode)
             self.state.quality = estimate.rated(results, identification, found.rating, reason)
+        if contradicted:
+            self.transitions.failed(results.mode)
         if not believed:
             return self._fail(TaskStatus.CALCULATION_FAILED, "IDError")
         self.state.attitude = attitude
@@ -232,9 +246,53 @@ class Processing:
 
     def _solve(self, identification: Identification) -> Estimate:
         """The attitude with the weights that the switches select. Raises AttitudeError."""
-        stars = self.catalogue.vectors
+        stars, accuracy = self.known.vectors, None
+        if self.known is not self.catalogue:
+            accuracy = bodies.accuracies(self.known, self._bodies())
+            identification = bodies.usable(identification, accuracy)
         if self._switches.estimate == "votes":
             rotated = self._switches.equation == "rotated"
             return by_votes(self.results, identification, stars, self.meter, rotated=rotated)
         camera = configuration.camera_parameters(self.state.settings)
-        return by_errors(self.results, identification, stars, camera, self.meter)
+        return by_errors(self.results, identification, stars, camera, self.meter, accuracy=accuracy)
+
+    # --- planets and Moon ---------------------------------------------------------------------
+
+    @property
+    def known(self) -> StarCatalogue:
+        """The star list that the latest identities refer to, with planets."""
+        return self.results.known or self.catalogue
+
+    def _bodies(self) -> dict[int, Body]:
+        """Bodies by number, whose directions hold at the time of the image."""
+        if self._switches.bodies == "off":
+            return {}
+        self.meter.charge(flash_read=PAGE_BYTES // 4, i32_add=MOST_BODIES)
+        now_s = self.results.image_ms // 1000
+        return {at: one for at, one in enumerate(self.state.bodies) if one.until_s > now_s}
+
+    def _list_bodies(self) -> Routine[dict[int, Body]]:
+        """Let the searches know the planets, and find the Moon; returns all bodies."""
+        listed, self.results.known, self.results.bodies = self._bodies(), None, None
+        if listed:
+            self.results.known = bodies.with_bodies(self.catalogue, listed, self.meter)
+        if any(body.radius_rad for body in listed.values()):
+            disc = yield from find_disc(self.capture.memory, self.meter)
+            if disc is not None:
+                self.results = bodies.beside(disc, self.results, self.meter)
+            self.results.disc = disc
+            self.results.bodies = bodies.NO_BODIES | bodies.disc_values(disc)
+        return listed
+
+    def _moon_contradicts(self, found: Estimate) -> bool:
+        """Whether the Moon is not where the attitude puts it."""
+        for body in self._bodies().values():
+            if not body.radius_rad:
+                continue
+            camera = configuration.camera_parameters(self.state.settings)
+            rotation = dcm(found.quaternion, self.meter)
+            seen = bodies.check_disc(self.results.disc, body, rotation, camera, self.meter)
+            self.results.bodies = (self.results.bodies or bodies.NO_BODIES) | seen
+            if seen["Disc"] in (Disc.ABSENT, Disc.MISPLACED):
+                return True
+        return False

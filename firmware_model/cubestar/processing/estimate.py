@@ -83,15 +83,21 @@ def by_errors(
     vectors: NDArray[np.float32],
     camera: CameraParameters,
     meter: Meter,
+    *,
+    accuracy: NDArray[np.float32] | None = None,
 ) -> Estimate:
     """Weighted with inverse variances, displaced stars less, rated, and with the lens that the
-    stars support. Raises AttitudeError."""
+    stars support. Raises AttitudeError. ``accuracy`` (m,): of the catalogue's ``vectors`` in rad,
+    if they have errors."""
     kept, detection = identification.matched, results.detection
     scale = identification.scale if abs(identification.scale - 1) > SCALED else 1.0
     inertial, sigmas = (
         vectors[identification.stars[kept]],
         expected_errors(results, kept, camera, meter),
     )
+    if accuracy is not None:
+        sigmas = np.hypot(sigmas, accuracy[identification.stars[kept]])
+        meter.charge(f32_mul=2 * len(kept), f32_add=len(kept), f32_sqrt=len(kept))
     fit = robust_fit(results.vectors[kept], inertial, sigmas, meter, scale=scale, excess=EXCESS)
     meter.charge(flash_read=3 * len(kept))
     refused = False

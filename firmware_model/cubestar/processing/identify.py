@@ -11,6 +11,7 @@ from cubestack.firmware_model.attitude.quest import dcm
 from cubestack.firmware_model.cubestar import configuration
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.cubestar.detection import Detection
+from cubestack.firmware_model.cubestar.detection.disc import SeenDisc
 from cubestack.firmware_model.cubestar.matching import confirmed, voting
 from cubestack.firmware_model.cubestar.matching.identification import Identification
 from cubestack.firmware_model.cubestar.matching.tracking import track
@@ -51,6 +52,11 @@ class Results:
     #: number and time of the picture, as in ``Attitude``
     frame: int = 0
     image_ms: int = 0
+    #: the star list that the identities refer to, with planets; None: the catalogue's own
+    known: StarCatalogue | None = None
+    disc: SeenDisc | None = None  #: the Moon's, if it was sought and seen
+    #: values of telemetry Bodies; None until it ran
+    bodies: dict[str, Value] | None = None
     #: values of telemetry StellarGyro; None until it ran
     rate: dict[str, Value] | None = None
 

@@ -9,6 +9,7 @@ through a page (SetCameraRegisterPage); telemetry 138 is rejected as an unknown 
 from cubestack.firmware_model.interface.codec.message import Interface
 from cubestack.firmware_model.interface.codec.node_messages import AckError
 from cubestack.firmware_model.interface.cubestar.codes import (
+    Disc,
     IdMode,
     ImageBlockSize,
     MatchMode,
@@ -37,6 +38,7 @@ __all__ = [
     "INTERFACE",
     "UPLOAD_BLOCK_BYTES",
     "AckError",
+    "Disc",
     "IdMode",
     "ImageBlockSize",
     "MatchMode",

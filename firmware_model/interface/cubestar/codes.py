@@ -139,6 +139,17 @@ class Reason(IntEnum):
     LENS = 13  #: the stars do not fit the lens as described
 
 
+class Disc(IntEnum):
+    """The Moon's disc in the latest image; telemetry Bodies."""
+
+    NOT_SOUGHT = 0  #: no Moon is listed
+    NOT_SEEN = 1
+    SEEN = 2  #: there is no attitude, or the image's edge cuts it
+    CONFIRMED = 3  #: it is where the attitude puts it
+    MISPLACED = 4  #: the attitude puts it elsewhere, and is refused
+    ABSENT = 5  #: the attitude puts it into the image, and is refused
+
+
 class RateOutcome(IntEnum):
     """Why the latest image has no body rate, or MEASURED; telemetry StellarGyro."""
 

@@ -5,6 +5,7 @@ has no message for the image sensor's frame rate, which the thesis' ground softw
 (CubeStar thesis, appendix A). Sensor figures: appendices D and E there.
 """
 
+import math
 from dataclasses import replace
 
 from cubestack.firmware_model.interface.codec.attitude_quality import ATTITUDE_QUALITY
@@ -19,12 +20,17 @@ from cubestack.firmware_model.interface.codec.field import (
 )
 from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.interface.codec.switch_messages import switch_messages
-from cubestack.firmware_model.interface.cubestar.codes import MatchMode, RateOutcome, Reason
+from cubestack.firmware_model.interface.cubestar.codes import Disc, MatchMode, RateOutcome, Reason
 from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitches
 from cubestack.firmware_model.interface.cubestar.telecommands import IMAGE_BYTES
 
 #: Bytes of data per UploadBlock.
 UPLOAD_BLOCK_BYTES = 128
+
+MOST_BODIES = 8  #: planets and Moon that the host can list
+
+#: Numbers from here on in place of a Hipparcos number are those of bodies.
+FIRST_BODY = 4_000_000_000
 
 _LARGEST_FRAME_RATE = 39  # from 27 MHz and 1322 clocks per line: a frame must outlast its 512 lines
 
@@ -70,6 +76,18 @@ _TELECOMMANDS = (
     ).of(u16("Address", "register's address")),
     Message(107, "StopLoop", "end the 1 s loop after the current iteration"),
     *_SET_SWITCHES,
+    Message(
+        110, "SetBody", "list a planet or the Moon, for switch bodies; forgotten without power"
+    ).of(
+        u8("Number", "its place in the list", high=MOST_BODIES - 1),
+        f32("RightAscension", "right ascension seen from the satellite", "rad").within(
+            -math.pi, 2 * math.pi
+        ),
+        f32("Declination", "its declination", "rad").within(-math.pi / 2, math.pi / 2),
+        f32("Radius", "angular radius; 0: a planet, which is a point", "rad").within(0.0, 0.02),
+        f32("Accuracy", "standard deviation of the direction in each axis", "rad").within(0.0, 0.1),
+        u16("Minutes", "how long it holds; 0 removes it", "min"),
+    ),
 )
 
 _TELEMETRY = (
@@ -96,7 +114,7 @@ _TELEMETRY = (
     ),
     Message(202, "HipparcosNumber", "next identified star's Hipparcos number", steps=True).of(
         u8("StarNumber", "number of the detected star, from 0; 255: none"),
-        u32("Hipparcos", "Hipparcos number"),
+        u32("Hipparcos", f"Hipparcos number; {FIRST_BODY} plus the number of a body of SetBody"),
         f32("X", "measured column", "px"),
         f32("Y", "measured row", "px"),
     ),
@@ -156,6 +174,17 @@ _TELEMETRY = (
         u8("Matched", "stars found again"),
         f32("Residual", "root mean square of their residuals in each axis", "rad"),
         f32("LogFalseAlarm", "decimal logarithm of the probability of such a match by chance"),
+    ),
+    Message(211, "Bodies", "planets and Moon in the latest image").of(
+        u32("FrameCounter", "number of the image since power-up", counter=True),
+        u8("Listed", "bodies whose direction holds"),
+        u8("Named", "planets identified"),
+        u8("Used", "planets that are known well enough for the attitude"),
+        enum8("Disc", "the Moon's disc", choices=Disc),
+        u16("DiscSamples", "saturated ones, of every fourth pixel in every fourth row"),
+        f32("DiscX", "middle of its lit part and glare, column", "px"),
+        f32("DiscY", "the same, row", "px"),
+        f32("DiscApart", "angle between that and where the attitude puts the Moon", "rad"),
     ),
 )
 

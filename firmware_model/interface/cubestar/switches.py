@@ -123,6 +123,15 @@ class CubeStarSwitches(Switches):
         source="section 7.2 proposes it for a later version",
         reason="on works without identification, with few stars and with stars of no catalogue",
     )
+    bodies: str = switch(
+        "planets and Moon of telecommand SetBody as known objects, telemetry Bodies",
+        "off",
+        "off",
+        "on",
+        source="section 7.2 proposes to track both in a later version",
+        reason="on matches planets as stars and refuses an attitude with a dark sky where the Moon "
+        "must be",
+    )
 
 
 DEFAULT_SWITCHES = CubeStarSwitches()

@@ -14,12 +14,14 @@ from numpy.typing import NDArray
 from cubestack.firmware_model.interface import cubestar
 from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
 from cubestack.firmware_model.interface.cubestar import (
+    Disc,
     ImageBlockSize,
     MatchMode,
     RateOutcome,
     Reason,
     TaskStatus,
 )
+from cubestack.firmware_model.interface.cubestar.extensions import FIRST_BODY
 from cubestack.host.clients.contract import Columns, DeviceClient, Progress
 from cubestack.host.clients.quaternions import (
     AttitudeQuality,
@@ -93,6 +95,27 @@ class BodyRate:
 
 
 @dataclass(frozen=True)
+class ListedBody:
+    """A planet or the Moon for the node's list (switch ``bodies``)."""
+
+    direction: NDArray[np.float64]  #: (3,) inertial, seen from the satellite, any length
+    minutes: int  #: how long the direction holds; 0 removes the body
+    accuracy_rad: float = 0.0  #: standard deviation of the direction in each axis
+    radius_rad: float = 0.0  #: angular radius of the Moon; 0 for a planet
+
+
+@dataclass(frozen=True)
+class BodiesSeen:
+    """Planets and Moon in the latest image."""
+
+    listed: int  #: bodies whose direction holds
+    named: int  #: planets identified
+    used: int  #: planets that are known well enough for the attitude
+    disc: Disc  #: the Moon where the attitude puts it
+    disc_apart_rad: float  #: angle between the middle of its lit part and that place
+
+
+@dataclass(frozen=True)
 class Star:
     """A detected star."""
 
@@ -105,7 +128,8 @@ class Star:
     y_undistorted_px: float
     pixels: int  #: pixels of its area
     intensity: int  #: sum over the centroiding window in DN
-    hipparcos: int | None  #: Hipparcos number; None if not identified
+    hipparcos: int | None  #: Hipparcos number; None if not identified, or not a star
+    body: int | None = None  #: number of the planet in the list of bodies
 
 
 class CubeStar(DeviceClient):
@@ -247,6 +271,31 @@ class CubeStar(DeviceClient):
             frame=int(values["FrameCounter"]),
         )
 
+    def list_body(self, number: int, body: ListedBody) -> None:
+        """Put ``body`` at place ``number``, 0 to 7, of the node's list, for the images from now on.
+        A node without power forgets the list."""
+        x, y, z = body.direction
+        self.perform(
+            "SetBody",
+            Number=number,
+            RightAscension=float(np.arctan2(y, x)),
+            Declination=float(np.arctan2(z, np.hypot(x, y))),
+            Radius=body.radius_rad,
+            Accuracy=body.accuracy_rad,
+            Minutes=body.minutes,
+        )
+
+    def bodies_seen(self) -> BodiesSeen:
+        """What came of the list in the latest image; a software reset of the loop discards it."""
+        values = self.client.telemetry("Bodies")
+        return BodiesSeen(
+            listed=int(values["Listed"]),
+            named=int(values["Named"]),
+            used=int(values["Used"]),
+            disc=Disc(int(values["Disc"])),
+            disc_apart_rad=float(values["DiscApart"]),
+        )
+
     def latest(self) -> Columns:
         """The latest attitude with its image's time, the task's state and the stars."""
         found = self.attitude()
@@ -290,7 +339,8 @@ class CubeStar(DeviceClient):
         detected = int(self.client.telemetry("DetectionSummary")["NumStarsDetected"])
         identified = int(self.client.telemetry("NumIdStars")["numIdStars"])
         positions = self._records("StarPositions", detected)
-        names = self._records("HipparcosNumber", identified)
+        records = self._records("HipparcosNumber", identified)
+        names = {number: int(record["Hipparcos"]) for number, record in records.items()}
         return [
             Star(
                 number=number,
@@ -300,9 +350,11 @@ class CubeStar(DeviceClient):
                 y_undistorted_px=float(record["Y_CorrectedCoordinate"]),
                 pixels=int(record["Size"]),
                 intensity=int(record["Intensity"]),
-                hipparcos=int(names[number]["Hipparcos"]) if number in names else None,
+                hipparcos=name if name is not None and name < FIRST_BODY else None,
+                body=name - FIRST_BODY if name is not None and name >= FIRST_BODY else None,
             )
             for number, record in positions.items()
+            for name in (names.get(number),)
         ]
 
     def phase_times(self) -> dict[str, float]:

@@ -34,13 +34,16 @@ from numpy.typing import NDArray
 from cubestack.emulator.boards.cubestar.board import CubeStarBoard
 from cubestack.emulator.camera.common.view import SkyView
 from cubestack.emulator.camera.mlx75412.lens import CONDITION
+from cubestack.emulator.scene.hazards.moon import Moon
+from cubestack.emulator.scene.hazards.planets import Planets
 from cubestack.emulator.scene.sky import PictureScene, SkyScene
 from cubestack.firmware_model.formats.untrusted import read_json
 from cubestack.firmware_model.interface.cubestar import INTERFACE, IdMode, MatchMode, TaskStatus
 from cubestack.firmware_model.interface.cubestar.codes import Reason
+from cubestack.firmware_model.interface.cubestar.extensions import MOST_BODIES
 from cubestack.firmware_model.values import REQUIRED, ValueKind, choice, declare, number, whole
 from cubestack.host.calibration.camera import load_camera
-from cubestack.host.clients.cubestar.client import CubeStar
+from cubestack.host.clients.cubestar.client import CubeStar, ListedBody
 from cubestack.host.clients.cubestar.operator import calibrate, find_threshold
 from cubestack.host.devices.experiment import Mark
 from cubestack.host.emulation.emulated import EmulatedDevice
@@ -68,6 +71,13 @@ SKIES = 5
 
 START_S = 0.02
 """Start-up time in s of own firmware, which ignores its ports until then."""
+
+EPHEMERIS_RAD = 5e-5
+"""Error of the listed planets and Moon, 10 arcsec: of an almanac's short series."""
+
+EPHEMERIS = 211  # stream of their errors
+LISTED_MIN = 60
+UNLISTED = {"Sun", "Uranus", "Neptune"}  # not seen among the stars
 
 APART_S = 1.0
 """Time in s between two images of a sky, for the stellar gyro."""
@@ -148,6 +158,10 @@ class CubeStarResult(attitudes.AttitudeResult):
     rate_deg_s: list[float] | None = None
     rate_sigma_deg_s: list[float] | None = None
     rate_error_deg_s: list[float] | None = None
+    #: planets, disc: of switch bodies, planets identified and what the Moon's place shows; None
+    #: without
+    planets: int | None = None
+    disc: str | None = None
 
 
 class _Experiment(attitudes.AttitudeExperiment["CubeStarOpener", CubeStarOptions, CubeStarResult]):
@@ -176,16 +190,22 @@ class _Experiment(attitudes.AttitudeExperiment["CubeStarOpener", CubeStarOptions
             if camera is not None:
                 emulated.client.configure(calibrate(camera).settings)
             searches = options.searches and not _adapts(opened)
-            gyro = _has_gyro(opened) and options.mode == "lis"
+            gyro = _has(opened, "gyro") and options.mode == "lis"
+            bodies = _has(opened, "bodies")
+            listing = np.random.default_rng([options.seed, EPHEMERIS])
             threshold = _threshold(emulated, options, searches)
             for number in range(options.frames):
                 if number and options.is_random:
                     emulated.scene = _view(options, rng, emulated.time_s + EXPOSED_S)
+                if bodies:
+                    list_bodies(emulated, listing)
                 if options.is_random and gyro:
                     _earlier_image(emulated)
                 found = _measure(
                     emulated, options, picture_truth, rng, threshold, searches, opened.rates
                 )
+                if bodies:
+                    found = replace(found, **_seen(emulated))
                 yield replace(found, **_rate(emulated)) if gyro else found
 
     def summarise(self, results: Sequence[CubeStarResult], wall_s: float) -> Iterator[str]:
@@ -234,9 +254,36 @@ def _adapts(opened: CubeStarOpener) -> bool:
     return opened.rates and bool(switches.detection == "background")
 
 
-def _has_gyro(opened: CubeStarOpener) -> bool:
-    switches: Any = opened.switches
-    return not opened.board.get("firmware") and bool(switches.gyro == "on")
+def _has(opened: CubeStarOpener, switch: str) -> bool:
+    return not opened.board.get("firmware") and getattr(opened.switches, switch) == "on"
+
+
+def list_bodies(emulated: CubeStarEmulated, rng: np.random.Generator) -> None:
+    """List the scene's planets and Moon at the device, as an on-board computer with an ephemeris
+    does: each direction is wrong by ``EPHEMERIS_RAD``, 1 sigma in each axis."""
+    scene = emulated.scene
+    lights = [one for one in getattr(scene, "hazards", ()) if isinstance(one, (Planets, Moon))]
+    bodies = [body for one in lights for body in one.bodies if body.name not in UNLISTED]
+    for place in range(MOST_BODIES):
+        there = bodies[place] if place < len(bodies) else None
+        at = np.array([1.0, 0.0, 0.0]) if there is None else there.direction
+        if there is not None:
+            at = at + EPHEMERIS_RAD * rng.standard_normal(3)
+        emulated.client.list_body(
+            place,
+            ListedBody(
+                at,
+                minutes=0 if there is None else LISTED_MIN,
+                accuracy_rad=EPHEMERIS_RAD,
+                radius_rad=0.0 if there is None else float(np.radians(there.radius_deg)),
+            ),
+        )
+
+
+def _seen(emulated: CubeStarEmulated) -> dict[str, Any]:
+    """Fields of what came of the listed bodies."""
+    seen = emulated.client.bodies_seen()
+    return {"planets": seen.named, "disc": _words(seen.disc)}
 
 
 def _view(options: CubeStarOptions, rng: np.random.Generator, time_s: float = 0.0) -> SkyView:

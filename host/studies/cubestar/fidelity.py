@@ -22,6 +22,7 @@ from cubestack.host.experiments.cubestar.measure import CubeStarOpener
 from cubestack.host.experiments.hazard_options import Asked
 from cubestack.host.studies.calibrate import CalibrateOptions
 from cubestack.host.studies.cubestar import upsets
+from cubestack.host.studies.cubestar.bodies import BODIES
 from cubestack.host.studies.cubestar.calibrate import EXPERIMENT
 from cubestack.host.studies.cubestar.celestial import celestial
 from cubestack.host.studies.cubestar.gyro import GYRO
@@ -363,6 +364,7 @@ FIDELITY = Fidelity(
         "full-as-printed": _measured(60, mag_limit=4.5, set=AS_PRINTED),
         **VARIANTS,
         **GYRO,
+        **BODIES,
         "loop": Trial(_loop, 20, 2, 10),
         **{
             f"layout-{layout.value}": Trial(partial(_layout, layout=layout.value), 30, 2, 5)

@@ -404,6 +404,17 @@ def test_profile_and_switch_telecommands_take_effect_at_once(unit: Harness, sky:
     assert unit.telemetry("Profile") == shown_values(unit.algorithms)
 
 
+@telecommand("SetBody")
+def test_set_body_lists_a_direction_at_its_place(unit: Harness) -> None:
+    place = {"Number": 7, "RightAscension": 0.5, "Declination": 0.25, "Radius": 0.0045}
+    unit.command("SetBody", **place, Accuracy=1e-4, Minutes=2)
+    body = unit.program.state.bodies[7]
+    expected = [np.cos(0.25) * np.cos(0.5), np.cos(0.25) * np.sin(0.5), np.sin(0.25)]
+    np.testing.assert_allclose(body.direction, expected, atol=1e-7)
+    assert body.until_s == unit.now_us // 1_000_000 + 120
+    assert [one.until_s for one in unit.program.state.bodies[:7]] == [0] * 7
+
+
 @telecommand("setTrackingMode")
 def test_set_tracking_mode_selects_assisted_mode(unit: Harness) -> None:
     unit.command("setTrackingMode", RightAscension=1.0, Declination=-0.5)

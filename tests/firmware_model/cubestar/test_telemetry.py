@@ -29,6 +29,7 @@ ELSEWHERE = {
     "Profile": "test_effects",
     "Quality": "test_quality",
     "StellarGyro": "test_gyro",
+    "Bodies": "test_bodies",
     **dict.fromkeys(
         ("StarPositions", "BodyUnitVectors", "IDStarsDetails", "InertialUnitVectors", "NumIdStars",
          "StarDetails", "HipparcosNumber", "DetectionSummary", "BestStarIndex", "Star1Details",

@@ -10,6 +10,7 @@ from cubestack.emulator.scene.attitude import pointing_from_matrix
 from cubestack.firmware_model.interface.cubestar import (
     INTERFACE,
     AckError,
+    Disc,
     MatchMode,
     RateOutcome,
     Reason,
@@ -107,6 +108,16 @@ def test_body_rate_returns_rates_sigmas_and_outcome(cubestar: CubeStar, node: An
     np.testing.assert_allclose(rate.sigmas_rad_s, [1e-6, 2e-6, 3e-6], rtol=1e-6)
     node.values["StellarGyro"] = {"Outcome": RateOutcome.UNMATCHED}
     assert not cubestar.body_rate().valid
+
+
+def test_bodies_seen_returns_counts_and_the_disc(cubestar: CubeStar, node: Any) -> None:
+    node.values["Bodies"] = {
+        **{"FrameCounter": 7, "Listed": 3, "Named": 2, "Used": 1},
+        **{"Disc": Disc.CONFIRMED, "DiscApart": 0.003},
+    }
+    seen = cubestar.bodies_seen()
+    assert (seen.listed, seen.named, seen.used, seen.disc) == (3, 2, 1, Disc.CONFIRMED)
+    assert seen.disc_apart_rad == pytest.approx(0.003)
 
 
 def test_download_image_reports_progress(cubestar: CubeStar, node: Any) -> None:
