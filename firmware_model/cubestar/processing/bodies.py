@@ -37,7 +37,7 @@ GOOD_RAD = 2e-4
 #: chosen.
 DISC_MARGIN_RAD = 0.009
 
-#: Centroids within so many radii of the saturated glare, and so many px more, are not stars'.
+#: Centroids within this many radii of the saturated glare, and 6 px more, are not those of stars.
 GLARE, GLARE_PX = 1.25, 6
 
 NO_BODIES: dict[str, Value] = INTERFACE.telemetry("Bodies").reset_values()
