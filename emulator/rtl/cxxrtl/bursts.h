@@ -23,7 +23,7 @@ public:
         stream.go_to(edge);
         with(camera, [&](auto n) {
             Camera<n()>::frame(top, next.vsync);
-            put_sample<n()>(top);
+            put_sample<n()>(top, stream);
         });
         if (FOREIGN)
             settle(now);
@@ -31,7 +31,7 @@ public:
 
     void use_pixels(int camera, const uint8_t *rendered, int64_t now) {
         streams[camera].pixels = rendered;
-        with(camera, [&](auto n) { put_sample<n()>(top); });
+        with(camera, [&](auto n) { put_sample<n()>(top, streams[camera]); });
         if (FOREIGN)
             settle(now);
     }
@@ -53,6 +53,7 @@ public:
         } \
         if (same_##number(top, variant_##number)) { \
             const Outcome outcome = burst_on(variant_##number, until, running, reached, camera); \
+            variant_##number.keep(); \
             copy_##number(variant_##number, top); \
             top.eval(nullptr); \
             forget_derived_edges(top); \
@@ -110,31 +111,38 @@ private:
             with<N + 1>(camera, act);
     }
 
-    template <int N, class Model> void put_sample(Model &top) {
-        Camera<N>::line(top, streams[N].inside());
-        Camera<N>::data(top, streams[N].pixel());
+    template <int N, class Model> static void put_sample(Model &top, const Stream &stream) {
+        Camera<N>::line(top, stream.inside());
+        Camera<N>::data(top, stream.pixel());
+    }
+
+    template <int N, class Model> void run_edge(Model &top, int64_t time, int64_t until) {
+        Stream &stream = streams[N];
+        if (stream.edge % 2 == 0)
+            run_rise<N>(top, stream, time, until, false);
+        else
+            run_fall<N>(top, stream, time);
     }
 
     // With `alone`, no other camera's clock runs.
     template <int N, class Model>
-    void run_edge(Model &top, int64_t time, int64_t until, bool alone) {
-        Stream &stream = streams[N];
-        if (stream.edge % 2 == 0) {
-            const bool wrote = writes();
-            Camera<N>::clock(top, true);
-            const bool changed = settle_rise<N>(top, time);
-            stream.next_edge();
-            if (skipping && !changed && !stream.restless && !wrote && !stream.inside() &&
-                (alone || !FOREIGN))
-                stream.skip_low_samples(until);
-            return;
-        }
+    void run_rise(Model &top, Stream &stream, int64_t time, int64_t until, bool alone) {
+        const bool may_skip = skipping && !stream.restless && !stream.inside() &&
+                              (alone || !FOREIGN) && !writes();
+        Camera<N>::clock(top, true);
+        const bool changed = settle_rise<N>(top, time, may_skip);
+        stream.next_edge();
+        if (may_skip && !changed)
+            stream.skip_low_samples(until);
+    }
+
+    template <int N, class Model> void run_fall(Model &top, Stream &stream, int64_t time) {
         Camera<N>::clock(top, false);
         // The camera's lines move after its clock, so a falling edge samples the old levels.
         const bool fell = FOREIGN && settle_fall<N>(top, time);
         if (stream.edge + 1 < stream.segment.edges) {
             stream.next_sample();
-            put_sample<N>(top);
+            put_sample<N>(top, stream);
         }
         stream.restless = settle_fall<N>(top, time) || fell;
         stream.next_edge();
@@ -142,19 +150,19 @@ private:
 
     // Runs a stride of camera N, up to `until`, in one step. Leaves the last two clocks with the
     // same syncs, so that an ordinary clock follows.
-    template <int N, class Model> void run_strides(Model &top, int64_t until) {
-        run_strides<N>(top, until, std::make_integer_sequence<int, STRIDE_COUNT>());
+    template <int N, class Model> void run_strides(Model &top, Stream &stream, int64_t until) {
+        run_strides<N>(top, stream, until, std::make_integer_sequence<int, STRIDE_COUNT>());
     }
     template <int N, class Model, int... K>
-    void run_strides(Model &top, int64_t until, std::integer_sequence<int, K...>) {
-        (void)top, (void)until;
-        (void)(... || run_stride<N, K>(top, until));
+    void run_strides(Model &top, Stream &stream, int64_t until, std::integer_sequence<int, K...>) {
+        (void)top, (void)stream, (void)until;
+        (void)(... || run_stride<N, K>(top, stream, until));
     }
-    template <int N, int K, class Model> bool run_stride(Model &top, int64_t until) {
+    template <int N, int K, class Model>
+    bool run_stride(Model &top, Stream &stream, int64_t until) {
         if constexpr (Stride<K>::camera == N) {
             constexpr std::integral_constant<int, K> stride;
             constexpr bool stores = Stride<K>::stores;
-            Stream &stream = streams[N];
             if (stream.inside() != Stride<K>::line || !stride_ready(stride, top))
                 return false;
             const Segment &segment = stream.segment;
@@ -184,7 +192,7 @@ private:
             }
             stride_to(stride, top, counter + clocks, next ? next[clocks - 1] : 0);
             stream.go_to(end);
-            put_sample<N>(top);
+            put_sample<N>(top, stream);
             clocks_at_once += clocks;
             return true;
         }
@@ -198,21 +206,35 @@ private:
 
     template <int N, class Model>
     __attribute__((flatten)) Outcome burst_of_one(Model &top, int64_t until, int64_t &reached) {
+        Stream stream = streams[N];  // a copy, as nothing else refers to it
+        const Outcome outcome = burst_of_one<N>(top, stream, until, reached);
+        streams[N] = stream;
+        return outcome;
+    }
+
+    template <int N, class Model>
+    Outcome burst_of_one(Model &top, Stream &stream, int64_t until, int64_t &reached) {
         const uint32_t before = acknowledges(top);
-        while (!streams[N].over()) {
-            if (strides && streams[N].may_stride())
-                run_strides<N>(top, until);
-            const int64_t time = streams[N].time();
-            if (time > until) {
-                reached = until;
-                return TIME_REACHED;
+        const int64_t stop = stream.edges_until(until);
+        int64_t time = reached;
+        while (stream.edge < stop) {
+            if (stream.edge % 2 == 0) {
+                if (strides && stream.may_stride())
+                    run_strides<N>(top, stream, until);
+                time = stream.time();
+                run_rise<N>(top, stream, time, until, true);
+                if (acknowledges(top) != before)
+                    return reached = time, ACKNOWLEDGE_CHANGED;
+                if (stream.edge >= stop)
+                    break;
             }
-            reached = time;
-            run_edge<N>(top, time, until, true);
+            time = stream.time();
+            run_fall<N>(top, stream, time);
             if (acknowledges(top) != before)
-                return ACKNOWLEDGE_CHANGED;
+                return reached = time, ACKNOWLEDGE_CHANGED;
         }
-        return SEGMENT_OVER;
+        reached = stream.over() ? time : until;
+        return stream.over() ? SEGMENT_OVER : TIME_REACHED;
     }
 
     // At one instant the first camera's edge comes first.
@@ -232,7 +254,7 @@ private:
                 return TIME_REACHED;
             }
             reached = time;
-            with(camera, [&](auto n) { run_edge<n()>(top, time, until, false); });
+            with(camera, [&](auto n) { run_edge<n()>(top, time, until); });
             if (acknowledges(top) != before)
                 outcome = ACKNOWLEDGE_CHANGED;
             else if (streams[camera].over())

@@ -47,6 +47,7 @@ class _Steps:
     rise: str
     fall: str
     moves: list[bool]
+    registers: list[str]
 
 
 def clock_steps(wiring: Wiring, variant: str, members: dict[str, str], number: int) -> str:
@@ -54,7 +55,9 @@ def clock_steps(wiring: Wiring, variant: str, members: dict[str, str], number: i
 
     - in_reset(camera): whether any register of the camera's clock is or may be in reset, which
       requires eval() and commit().
-    - rise(camera): the clock has risen; returns whether any register changed.
+    - rise<Compare>(camera): the clock has risen; returns whether any register changed, or with
+      Compare false nothing of meaning. It changes only the current level of registers.
+    - keep(): makes that the next level too, which eval() and copies of the state require.
     - fall(camera): it has fallen, and the camera's other pins may have changed.
     - may_move(camera, memory): whether the clock can change a pin of that memory.
 
@@ -62,18 +65,23 @@ def clock_steps(wiring: Wiring, variant: str, members: dict[str, str], number: i
     """
     evaluation = _evaluation(variant, members)
     lines = [f"struct variant_{number}_steps : cxxrtl_variant_{number}::p_top {{"]
+    kept: set[str] = set()
     for index, camera in enumerate(wiring.cameras):
         tag = f"std::integral_constant<int, {index}>"
         steps = None if evaluation is None else _steps(wiring, camera, tag, evaluation, members)
         if steps is None:
-            steps = _Steps("true", "return true;\n", "", [True] * len(wiring.memories))
+            steps = _Steps("true", "return true;\n", "", [True] * len(wiring.memories), [])
+        kept.update(steps.registers)
         mask = f"{sum(1 << n for n, moves in enumerate(steps.moves) if moves)}u"
         lines += [
             f"bool in_reset({tag}) const {{ return {steps.in_reset}; }}",
-            f"bool rise({tag}) {{\n{steps.rise}}}",
+            f"template <bool Compare> bool rise({tag}) {{\n{steps.rise}}}",
             f"void fall({tag}) {{\n{steps.fall}}}",
             f"static constexpr bool may_move({tag}, int memory) {{ return {mask} >> memory & 1; }}",
         ]
+    lines.append(
+        f"void keep() {{ {' '.join(f'{name}.next = {name}.curr;' for name in sorted(kept))} }}"
+    )
     return "\n".join(lines) + "\n};\n"
 
 
@@ -149,14 +157,15 @@ def _steps(
     for block in blocks:
         rise += _NEXT.sub(r"next_\1 = ", block.replace(f"if (posedge_{clock}) ", "", 1)) + "\n"
     for name in registers:
-        rise += f"changed |= {name}.curr != next_{name};\n"
-        rise += f"{name}.curr = {name}.next = next_{name};\n"
+        rise += f"if (Compare) changed |= {name}.curr != next_{name};\n"
+        rise += f"{name}.curr = next_{name};\n"
     rise += "}\n" + _assignments(evaluation, after_rise & outputs) + "return changed;\n"
     return _Steps(
         " || ".join(c for c, reset in evaluation.resets.items() if reset & {*registers}) or "false",
         rise,
         now + _assignments(evaluation, after_fall & outputs),
         [any(port(memory[pin]) in after_rise for pin in MEMORY_PINS) for memory in wiring.memories],
+        registers,
     )
 
 

@@ -71,9 +71,9 @@ template <int N> struct Memory;
     template <> struct Memory<number> { \
         template <class Model> static SramPins pins(const Model &top) { \
             return SramPins( \
-                top.a.template get<uint32_t>(), top.ce_n.template get<bool>(), \
-                top.oe_n.template get<bool>(), top.we_n.template get<bool>(), \
-                top.d_oe.template get<bool>(), top.d_o.template get<uint8_t>()); \
+                top.a.template get<uint32_t>(), top.ce_n.template get<uint32_t>(), \
+                top.oe_n.template get<uint32_t>(), top.we_n.template get<uint32_t>(), \
+                top.d_oe.template get<uint32_t>(), top.d_o.template get<uint32_t>()); \
         } \
         template <class Model> static void offer(Model &top, uint8_t value) { \
             top.d_i.template set<uint8_t>(value); \

@@ -41,7 +41,8 @@ public:
     }
 
 private:
-    // An edge of the data clock within a stride: all but the design's outputs is known.
+    // An edge of the data clock within a stride: all but the address and the byte that the design
+    // shows is known, and a falling edge changes nothing.
     bool clock_in_stride(bool level, int64_t now) {
         return clock_in_stride(level, now, std::make_integer_sequence<int, STRIDE_COUNT>());
     }
@@ -67,7 +68,7 @@ private:
             }
             top.DATA_CLOCK.set<bool>(level);
             forget_edges(top);
-            eval_once(top);
+            if (level) eval_once(top);
             return true;
         }
         return false;

@@ -85,6 +85,8 @@ protected:
 
     template <class Model> bool settle_registers(Model &top) {
         bool changed = false;
+        if constexpr (!std::is_same_v<Model, Top>)
+            top.keep();
         eval(top);
         for (int rounds = 0; commit(top); rounds++) {
             changed = true;
@@ -142,15 +144,20 @@ protected:
     template <class Model> static uint32_t acknowledges(const Model &top) { return ACKNOWLEDGES; }
 
     // Settle after an edge of camera N's clock. A variant computes only what the edge affects,
-    // unless registers are in reset; see clock_steps.py.
-    template <int N> bool settle_rise(Top &top, int64_t time) { return settle(top, time); }
+    // unless registers are in reset; see clock_steps.py. Without `compare`, the result of
+    // settle_rise has no meaning.
+    template <int N> bool settle_rise(Top &top, int64_t time, bool compare) {
+        (void)compare;
+        return settle(top, time);
+    }
     template <int N> bool settle_fall(Top &top, int64_t time) { return settle(top, time); }
 
-    template <int N, class Model> bool settle_rise(Model &top, int64_t time) {
+    template <int N, class Model> bool settle_rise(Model &top, int64_t time, bool compare) {
         constexpr std::integral_constant<int, N> camera;
         if (top.in_reset(camera))
             return settle_in_reset(top, time);
-        const bool changed = top.rise(camera);
+        const bool changed =
+            compare ? top.template rise<true>(camera) : top.template rise<false>(camera);
         if (top.in_reset(camera))
             return settle_in_reset(top, time) | changed;
         const bool moved = follow<N>(top, time);

@@ -46,10 +46,11 @@ private:
 class SramPins {
 public:
     SramPins() : SramPins(0, true, true, true, false, 0) {}
-    // `driven`: the FPGA drives the data bus, with `data`.
-    SramPins(uint32_t address, bool ce_n, bool oe_n, bool we_n, bool driven, uint8_t data)
-        : word((uint64_t)address << 16 | (uint64_t)(driven ? data : 0) << 8 |
-               (uint64_t)(driven << 3 | ce_n << 2 | oe_n << 1 | we_n << 0)) {}
+    // Levels of 0 or 1; `driven`: the FPGA drives the data bus, with `data`.
+    SramPins(uint32_t address, uint32_t ce_n, uint32_t oe_n, uint32_t we_n, uint32_t driven,
+             uint32_t data)
+        : word((uint64_t)address << 16 | (data & (0u - driven)) << 8 | driven << 3 | ce_n << 2 |
+               oe_n << 1 | we_n << 0) {}
 
     uint32_t address() const { return (uint32_t)(word >> 16); }
     uint8_t data() const { return (uint8_t)(word >> 8); }  // 0 when not driven

@@ -108,6 +108,11 @@ struct Stream {
         return rest ? *rest : 0;
     }
 
+    // Number of the segment's edges up to `time`.
+    int64_t edges_until(int64_t time) const {
+        return time < segment.start ? 0 : std::min(segment.edges, edge_after(time));
+    }
+
     // First edge after `time`.
     int64_t edge_after(int64_t time) const { return times.last_within(time - segment.start) + 1; }
 
