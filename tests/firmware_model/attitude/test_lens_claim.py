@@ -5,6 +5,7 @@ import pytest
 from scipy.stats import norm, t
 
 from cubestack.firmware_model.attitude.lens_claim import _tails
+from tests.tiers import quick
 
 from .test_lens_doubt import FOCAL_PX, NARROW, TOLERANCE, is_within, judged
 
@@ -22,7 +23,7 @@ def shift(seed: int, px: float) -> tuple[float, float]:
     return px * np.cos(angle), px * np.sin(angle)
 
 
-@pytest.mark.parametrize("stars", [4, 5, 9, 14])
+@pytest.mark.parametrize("stars", quick([4, 5, 9, 14], 2))
 @pytest.mark.parametrize("percent", [0.5, 2.0, 5.0])
 def test_no_shape_of_pixels_is_believed_outside_of_the_claim(stars: int, percent: float) -> None:
     for seed in SKIES:
@@ -31,7 +32,7 @@ def test_no_shape_of_pixels_is_believed_outside_of_the_claim(stars: int, percent
 
 
 @pytest.mark.parametrize("longer", [1.0, 2.5, NARROW])
-@pytest.mark.parametrize("stars", [4, 5, 9, 14])
+@pytest.mark.parametrize("stars", quick([4, 5, 9, 14], 2))
 @pytest.mark.parametrize("tolerances", [1.0, 2.0, 4.0])
 def test_no_principal_point_is_believed_outside_of_the_claim(
     longer: float, stars: int, tolerances: float

@@ -4,6 +4,7 @@ import pytest
 from cubestack.firmware_model.cubesense.download import frame_pixels
 from cubestack.firmware_model.interface.cubesense import codes
 from cubestack.firmware_model.mcu.requests import Request
+from tests.tiers import quick
 
 from .links_harness import Links
 from .scenery import thumbnail
@@ -23,7 +24,7 @@ def expected(node: Links, sram: codes.Sram, size: codes.ImageSize) -> list[bytes
     return [frame.tobytes() for frame in square.reshape(-1, 128)]
 
 
-@pytest.mark.parametrize("size", codes.ImageSize)
+@pytest.mark.parametrize("size", quick(codes.ImageSize, 2))
 def test_image_download_reads_the_memory_once(node: Links, size: codes.ImageSize) -> None:
     sram = codes.Sram(size % 2)
     node.command("StartImageDownload", Sram=sram, Size=size)

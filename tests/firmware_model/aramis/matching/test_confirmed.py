@@ -28,6 +28,7 @@ from cubestack.host.studies.aramis.sky import (
     picture,
     pictures,
 )
+from tests.tiers import quick
 
 PROFILE = VERIFIED.profile
 
@@ -40,7 +41,7 @@ def found(
     return identify(replace(stars, sigma_px=sigma), FIELD, profile, database(), meter())
 
 
-@pytest.mark.parametrize("noise_px", [0.05, 0.2, 0.5])
+@pytest.mark.parametrize("noise_px", quick([0.05, 0.2, 0.5], 1))
 def test_confirmed_attitude_errors_match_the_reported_sigma(noise_px: float) -> None:
     """Without the lens' tolerance, an error that an exact lens does not have."""
     inside, sure = [], replace(PROFILE, judge_lens=False)

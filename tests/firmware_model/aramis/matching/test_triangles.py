@@ -225,7 +225,7 @@ def scored(light: Array, vectors: Array, known: Array) -> list[int]:
     return [int(np.argmax(row)) for row in scores]
 
 
-@pytest.mark.parametrize("aided", [False, True])
+@pytest.mark.parametrize("aided", quick([False, True], 1))
 @pytest.mark.parametrize(
     "light", quick([Light(mag_limit=5, false_stars=3), Light(), Light(noise_px=1)], 1)
 )
