@@ -17,26 +17,34 @@ int64_t root_of(std::vector<int64_t>& parents, int64_t run) {
 
 extern "C" {
 
-// First places of marks and places behind them, in turn; at most `most` of them. Returns their
-// number, also if there are more.
-int64_t runs_of(const uint8_t* bright, int64_t size, int64_t* edges, int64_t most) {
+// First places of marks and places behind them, in turn, as if `gap` dark pixels followed each row;
+// at most `most` of them. Returns their number, also if there are more.
+int64_t runs_of(const uint8_t* bright, int64_t rows, int64_t columns, int64_t gap, int64_t* edges,
+                int64_t most) {
     int64_t found = 0;
-    uint8_t before = 0;
-    for (int64_t at = 0; at < size;) {
-        uint64_t eight;
-        if (at + 8 <= size) {
-            std::memcpy(&eight, bright + at, 8);
-            if (eight == before * 0x0101010101010101u) {
-                at += 8;
-                continue;
+    const auto note = [&](int64_t place) {
+        if (found < most) edges[found] = place;
+        found++;
+    };
+    for (int64_t row = 0; row < rows; row++, bright += columns) {
+        const int64_t first = row * (columns + gap);
+        uint8_t before = 0;
+        for (int64_t at = 0; at < columns;) {
+            uint64_t eight;
+            if (at + 8 <= columns) {
+                std::memcpy(&eight, bright + at, 8);
+                if (eight == before * 0x0101010101010101u) {
+                    at += 8;
+                    continue;
+                }
+            }
+            for (const int64_t end = std::min(at + 8, columns); at < end; at++) {
+                if (bright[at] == before) continue;
+                before = bright[at];
+                note(first + at);
             }
         }
-        for (const int64_t end = std::min(at + 8, size); at < end; at++) {
-            if (bright[at] == before) continue;
-            before = bright[at];
-            if (found < most) edges[found] = at;
-            found++;
-        }
+        if (before) note(first + columns);
     }
     return found;
 }

@@ -13,7 +13,7 @@ Ints = NDArray[np.int64]
 Reals = NDArray[np.float64]
 Marks = NDArray[np.bool_]
 
-_OF = Loop("runs_of", MARKS, INT, INTS, INT)
+_OF = Loop("runs_of", MARKS, INT, INT, INT, INTS, INT)
 _JOIN = Loop("runs_join", INTS, INTS, INT, INT, INTS)
 
 
@@ -25,17 +25,19 @@ class Runs:
     ends: Ints
 
     @classmethod
-    def of(cls, bright: Marks) -> Self:
-        """Runs of a mask (rows, columns) whose last column is False."""
+    def of(cls, bright: Marks, gap: int = 0) -> Self:
+        """Runs of a mask (rows, columns), as if each row were longer by ``gap`` dark pixels; without
+        them its last column is False."""
         if _OF:
             marks, most = np.ascontiguousarray(bright), 4096
             while True:
                 edges = np.empty(most, np.int64)
-                found = _OF(marks, marks.size, edges, most)
+                found = _OF(marks, *marks.shape, gap, edges, most)
                 if found <= most:
                     return cls(edges[:found:2], edges[1:found:2])
                 most = found
-        edges = np.flatnonzero(np.diff(bright.reshape(-1).view(np.int8), prepend=np.int8(0)))
+        flat = np.pad(bright, ((0, 0), (0, gap))).reshape(-1)
+        edges = np.flatnonzero(np.diff(flat.view(np.int8), prepend=np.int8(0)))
         return cls(edges[::2], edges[1::2])
 
     def __len__(self) -> int:

@@ -38,7 +38,7 @@ class RamCopy:
         self._sdram, self._meter, self._protection = sdram, meter, protection
         self.length = 0  #: bytes of the good copy
         self._checksum = 0
-        self._good = self._good_checks = np.zeros(0, np.uint8)  # of the model: what RAM should hold
+        self._good, self._good_checks = bytearray(), np.zeros(0, np.uint8)  # what RAM should hold
 
     def view(self, length: int) -> NDArray[np.uint8]:
         return self._sdram[CATALOGUE_AT : CATALOGUE_AT + length]
@@ -57,8 +57,8 @@ class RamCopy:
 
     def accept(self, length: int) -> None:
         """What was written is a good catalogue of ``length`` bytes."""
-        self.length, self._good = length, self.view(length).copy()
-        self._checksum = crc32(self._good.data)
+        self.length, self._good = length, bytearray(self.view(length))
+        self._checksum = crc32(self._good)
         self._good_checks = self._checks(length).copy()
 
     def check(self) -> int | None:
@@ -86,7 +86,8 @@ class RamCopy:
         self._meter.charge(ram_read=2 * whole + -(-whole // 4), coded_word=whole, loop=whole)
         # Words that are as loaded have nothing to correct.
         data, checks = self._words(self.view(self.length)), self._checks(self.length)
-        same = (data == self._words(self._good)).all(axis=1) & (checks == self._good_checks)
+        good = self._words(np.frombuffer(self._good, np.uint8))
+        same = (data == good).all(axis=1) & (checks == self._good_checks)
         at = np.flatnonzero(~same)
         mended, mended_checks = data[at], checks[at]
         corrected, lost = mend(mended, mended_checks)
@@ -112,6 +113,6 @@ class RamCopy:
 
     def _is_right(self, copy: NDArray[np.uint8]) -> bool:
         self._meter.charge(ram_read=-(-self.length // 4), table_byte=self.length, loop=self.length)
-        if np.array_equal(copy, self._good):  # a tenth of the model's time
+        if self._good == copy.data:  # the fastest comparison; a bytearray compares buffers
             return True
         return crc32(copy.data) == self._checksum

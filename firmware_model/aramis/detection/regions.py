@@ -40,12 +40,13 @@ class Regions:
     @cached_property
     def box(self) -> tuple[Indices, Indices, Indices, Indices]:
         """First row and column, last row and column (n,) of each region."""
-        first, last = np.full((2, self.count), np.iinfo(np.intp).max), np.zeros((2, self.count))
+        first = np.full((2, self.count), np.iinfo(np.intp).max)
+        last = np.zeros((2, self.count), np.intp)
         pixels = np.stack([self.rows, self.columns])
         for axis in (0, 1):
             np.minimum.at(first[axis], self.labels, pixels[axis])
             np.maximum.at(last[axis], self.labels, pixels[axis])
-        (top, left), (bottom, right) = first, last.astype(np.intp)
+        (top, left), (bottom, right) = first, last
         return top, left, bottom, right
 
     def only(self, chosen: Mask) -> "Regions":
@@ -72,10 +73,7 @@ def find_regions(mask: Mask) -> Regions | None:
 
     One pass lists the runs of each row, a second joins runs of neighbouring rows that touch.
     """
-    width = mask.shape[1] + 1
-    padded = np.zeros((mask.shape[0], width), np.bool_)
-    padded[:, :-1] = mask
-    runs = Runs.of(padded)
+    runs, width = Runs.of(mask, gap=1), mask.shape[1] + 1
     if len(runs) > MOST_RUNS:
         return None
     labels, touching = runs.join(width)
