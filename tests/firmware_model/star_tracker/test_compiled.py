@@ -43,7 +43,8 @@ def test_runs_and_their_regions(seed: int, rows: int, columns: int, share: float
     bright[:, -1] = False
 
     def compute(_meter: object) -> object:
-        runs = Runs.of(bright)
+        runs = Runs.of(bright[:, :-1], gap=1)
+        assert np.array_equal([runs.begins, runs.ends], [*vars(Runs.of(bright)).values()])
         left = runs.without(runs.places()[::3])
         return runs, left, runs.join(columns + 1), left.join(columns + 1)
 
