@@ -26,8 +26,10 @@ class Runs:
 
     @classmethod
     def of(cls, bright: Marks, gap: int = 0) -> Self:
-        """Runs of a mask (rows, columns), as if each row were longer by ``gap`` dark pixels; without
-        them its last column is False."""
+        """Runs of a mask (rows, columns), as if ``gap`` dark pixels followed each row.
+
+        Without a gap the mask's last column is False.
+        """
         if _OF:
             marks, most = np.ascontiguousarray(bright), 4096
             while True:
