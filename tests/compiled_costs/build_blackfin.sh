@@ -1,6 +1,6 @@
 #!/bin/sh
 # Build gcc, binutils and newlib's mathematics for the Blackfin, and gdb's simulator, from Debian's
-# sources. Takes 2 GB, and most of an hour on a busy machine of two cores; as root on Debian 12:
+# sources. Takes 1.4 GB and 12.8 minutes of processor time, as root on Debian 12:
 #
 #   tests/compiled_costs/build_blackfin.sh FOLDER
 #
@@ -11,13 +11,15 @@ cd "$1"
 folder=$PWD
 
 apt-get update
-apt-get install -y --no-install-recommends build-essential bison flex texinfo \
+apt-get install -y --no-install-recommends build-essential bison flex \
     libgmp-dev libmpfr-dev libmpc-dev binutils-source gcc-12-source gdb-source newlib-source
 
 unpack() { # archive, folder
     [ -d "$2" ] && return
     rm -rf "$2.part" && mkdir "$2.part"
-    tar -xf "/usr/src/$1" -C "$2.part" --strip-components=1
+    # Most of gcc's files are tests (its build runs only selftests), other languages and libraries.
+    tar -xf "/usr/src/$1" -C "$2.part" --strip-components=1 --exclude='gcc/testsuite/[!s]*' \
+        --exclude=gcc/ada --exclude=libstdc++-v3 --exclude=libgo --exclude=libphobos
     mv "$2.part" "$2"
 }
 unpack binutils/binutils-2.40.tar.xz binutils
@@ -27,11 +29,12 @@ unpack gcc-12/gcc-12.2.0-dfsg.tar.xz gcc
 unpack gdb.tar.xz gdb
 unpack newlib/newlib-3.3.0.tar.xz newlib
 
-# The programs are used for seconds, so a quick build beats quick code.
-export CFLAGS="-O0 -w" CXXFLAGS="-O0 -w" PATH="$folder/bin:$PATH"
+# The programs are used for seconds, so a quick build beats quick code; nobody reads the manuals.
+export CFLAGS="-O0 -w" CXXFLAGS="-O0 -w" MAKEINFO=true PATH="$folder/bin:$PATH"
 usual="--target=bfin-elf --prefix=$folder --disable-nls --disable-werror --disable-shared"
 
 build() { # name, options, goals
+    echo "$1: $(date)"
     mkdir -p "$1.build"
     (cd "$1.build" && [ -f Makefile ] || ../"$1"/configure $usual $2 >configure.out 2>&1)
     for goal in $3; do
@@ -42,10 +45,12 @@ build() { # name, options, goals
 build binutils "--disable-gdb --disable-sim --disable-gprofng --disable-ld-plugin" \
     "all-binutils all-gas all-ld install-binutils install-gas install-ld"
 build gcc "--enable-languages=c --without-headers --with-newlib --disable-multilib --disable-lto
-    --disable-libssp --disable-libquadmath --disable-libgomp --disable-threads --disable-plugin" \
+    --disable-libssp --disable-libquadmath --disable-libgomp --disable-threads --disable-plugin
+    --disable-gcov --enable-checking=no" \
     "all-gcc install-gcc all-target-libgcc install-target-libgcc"
 build gdb "--enable-sim --disable-gdb --disable-gdbserver --disable-binutils --disable-gas
     --disable-ld --disable-gprof" "all-sim install-sim"
 build newlib "--disable-multilib" \
     "all-target-newlib all-target-libgloss install-target-newlib install-target-libgloss"
 ls bin/bfin-elf-gcc bin/bfin-elf-run
+times # of this shell, then of all that it ran: user and system

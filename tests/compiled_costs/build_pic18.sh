@@ -23,3 +23,4 @@ ports="mcs51 z80 z180 r2k r2ka r3ka sm83 tlcs90 ez80_z80 z80n ds390 ds400 pic14 
 sed -i 's/-pipe -ggdb -g -O2/-O0 -w/' Makefile.common src/Makefile
 make -j"${JOBS:-$(nproc)}"
 ls bin/sdcc
+times # of this shell, then of all that it ran: user and system
