@@ -82,7 +82,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     """
     days = config.getoption("--days")
     slow = [item for item in items if item.get_closest_marker("slow")]
-    turns = [tiers.turns(days, item.get_closest_marker("weekly") is not None) for item in slow]
+    turns = [tiers.turns(item, days) for item in slow]
     today = tiers.of_day([item.nodeid for item in slow], tiers.DAY, turns)
     others = {item for item, runs in zip(slow, today, strict=True) if not runs}
     config.hook.pytest_deselected(items=[*others])

@@ -24,6 +24,12 @@ def test_every_slow_test_has_one_turn_and_a_family_is_spread(days: int) -> None:
     assert max(family) - min(family) <= 1
 
 
-def test_weekly_tests_run_in_a_week_and_all_on_request() -> None:
-    assert [tiers.turns(days, weekly=True) for days in (0, 1, 7, 9)] == [1, 7, 7, 9]
-    assert [tiers.turns(days, weekly=False) for days in (0, 1, 7)] == [1, 1, 7]
+@pytest.mark.parametrize(
+    ("mark", "turns"), [("daily", [1, 1, 1, 1]), ("slow", [1, 1, 7, 9]), ("weekly", [1, 7, 7, 9])]
+)
+def test_weekly_tests_have_a_turn_in_a_week_and_daily_ones_always(
+    mark: str, turns: list[int], request: pytest.FixtureRequest
+) -> None:
+    item = request.node
+    item.add_marker(mark)
+    assert [tiers.turns(item, days) for days in (0, 1, 7, 9)] == turns

@@ -40,9 +40,11 @@ def todays(turn: int, turns: int, cases: int) -> int:
     return first + DAY % (end - first)
 
 
-def turns(days: int, weekly: bool) -> int:
-    """Days in which a slow test has one turn, where such tests have one in ``days``; 0: in each."""
-    return max(days, 7 if weekly else 1) if days else 1
+def turns(item: pytest.Item, days: int) -> int:
+    """Days in which a slow test has one turn, where others have one in ``days``; 0: all in each."""
+    if days == 0 or item.get_closest_marker("daily"):
+        return 1
+    return max(days, 7) if item.get_closest_marker("weekly") else days
 
 
 def of_day(names: Iterable[str], day: int, days: Iterable[int]) -> list[bool]:

@@ -65,10 +65,10 @@ JOBS = [job for device in BUILT_IN for job in all_jobs(device)]
 
 
 def case(job: Job) -> Any:
-    """A test's case, weekly if the row takes 20 s."""
+    """A test's case: daily below 20 s, else weekly."""
     long = load(record_file(DOCS, job.device))[job.key].seconds >= 20
-    marks = [pytest.mark.weekly] if long else []
-    return pytest.param(job, id=f"{job.device} {job.key}", marks=marks)
+    mark = pytest.mark.weekly if long else pytest.mark.daily
+    return pytest.param(job, id=f"{job.device} {job.key}", marks=mark)
 
 
 def check(job: Job) -> None:
