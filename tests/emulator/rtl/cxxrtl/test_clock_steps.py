@@ -40,7 +40,7 @@ def steps(wiring: Wiring, text: str) -> str:
 def test_compiled_step_handles_the_release_of_reset(star):
     text = steps(*star)
     assert "in_reset(std::integral_constant<int, 0>) const { return p_pix__reset" in text
-    assert len(re.findall(r"^changed \|= ", text, re.MULTILINE)) == 11
+    assert len(re.findall(r"^if \(Compare\) changed \|= ", text, re.MULTILINE)) == 11
 
 
 def test_falling_clock_edge_changes_only_the_write_strobe(star):
