@@ -27,6 +27,7 @@ LEFT = {
     r"stars\.jsonl": "needs stars of a unit: tests/system/test_calibrate.py",
     r"qemu-system-arm|\./star_tracker": "programs of others: tests/system/serial_programs",
     r"flight": "the reader's flight software",
+    r"/tmp/(blackfin|pic18)|/etc/apt/": "as root, on an empty Debian: tests/compiled_costs",
     r"binned:Binned": "in its folder: examples/own_gateware/tests",
     r"^run -- bash|my_script\.py|^hdl wave|^shell emulated:cubesense$": "the reader's turn",
 }

@@ -57,7 +57,7 @@ OWN = sorted(set(own()))
 #: Programs that are not this project's, and what the documents do with them.
 OTHERS = {"pip", "python", "python3", "pytest", "curl", "dask", "echo", "exec", "printf", "head"}
 OTHERS |= {"", "cd", "cp", "gdb-multiarch", "openFPGALoader"}  # the first one is `.`
-OTHERS |= {"cc", "arm-none-eabi-gcc"}
+OTHERS |= {"cc", "arm-none-eabi-gcc", "sed", "build_blackfin.sh", "build_pic18.sh"}
 
 #: Commands that are parsed and not run here, and why.
 NOT_HERE = LEFT | {
