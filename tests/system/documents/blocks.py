@@ -11,7 +11,7 @@ from typing import NamedTuple
 ROOT = Path(__file__).parents[3]
 
 BLOCK = re.compile(r"^( *)```([^\n]*)\n(.*?)^ *```$", re.MULTILINE | re.DOTALL)
-ENVIRONMENT = re.compile(r"[A-Z_]+=\S*")
+ENVIRONMENT = re.compile(r"[A-Z][A-Z_0-9]*=\S*")
 
 SERVES = r"^emulate\b(?!.* --timeout)|^ground\b"  # until Ctrl-C
 MAKES_PORT = r"^emulate\b"
@@ -27,7 +27,6 @@ LEFT = {
     r"stars\.jsonl": "needs stars of a unit: tests/system/test_calibrate.py",
     r"qemu-system-arm|\./star_tracker": "programs of others: tests/system/serial_programs",
     r"flight": "the reader's flight software",
-    r"/tmp/(blackfin|pic18)|/etc/apt/": "as root, on an empty Debian: tests/compiled_costs",
     r"binned:Binned": "in its folder: examples/own_gateware/tests",
     r"^run -- bash|my_script\.py|^hdl wave|^shell emulated:cubesense$": "the reader's turn",
 }

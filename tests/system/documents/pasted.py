@@ -186,6 +186,8 @@ def left_out(line: str, folder: Path, *, long: bool) -> str:
     readers = "PROGRAM", "my_script", "picture.elf", "./star", "glow-sensor", "dask", "--lg-env"
     if any(word in typed for word in readers):
         return "the reader's turn"
+    if "compiled_costs" in typed or "/etc/apt/" in typed:
+        return "as root, on an empty Debian"
     return ""
 
 
