@@ -60,10 +60,11 @@ def test_quick_run_measures_every_row_in_both_profiles(run: Run, name: str) -> N
     assert [row["key"] for row in rows] == [row.key for row in fidelity_of(name).rows]
     for row in rows:
         assert set(row["ours"]) == {"published", "extended"}, row["key"]
+        if row["key"].startswith(NEVER):
+            continue
         for value in row["ours"].values():
             assert any(character.isdigit() for character in value), (row["key"], value)
-            unknown = [word for word in re.split("[ ,;()]+", value) if word == "-"]
-            assert not unknown or row["key"].startswith(NEVER), (row["key"], value)
+            assert "-" not in re.split("[ ,;()]+", value), (row["key"], value)
 
 
 @pytest.mark.parametrize("name", BUILT_IN)
