@@ -27,7 +27,8 @@ from cubestack.firmware_model.values import FLAG, NUMBER, WHOLE, Declaration
 #: A field's value: bool for bool1, bytes for bytesN, a number for all others.
 Value = int | float | bool | bytes
 
-_WIDTHS = {"bool1": 1, "u8": 8, "enum8": 8, "u16": 16, "i16": 16, "u32": 32, "f32": 32}
+#: Format of each type in module struct.
+_ITEMS = {"bool1": "?", "u8": "B", "enum8": "B", "u16": "H", "i16": "h", "u32": "I", "f32": "f"}
 _BYTES = re.compile(r"bytes([1-9][0-9]*)")
 
 #: The allowed values of a field, with their names.
@@ -54,9 +55,9 @@ def _nearest_f32(value: float) -> float:
 
 
 def _round_half_away(value: float) -> int:
-    magnitude = abs(value)
-    whole = math.floor(magnitude)
-    return int(math.copysign(whole + (magnitude - whole >= 0.5), value))
+    whole = int(value)
+    rest = value - whole
+    return whole + (rest >= 0.5) - (rest <= -0.5)
 
 
 class Severity(Enum):
@@ -131,8 +132,8 @@ class Field(Declaration):
 
     def __post_init__(self) -> None:
         """Check the declaration; raises InterfaceError."""
-        if self.type not in _WIDTHS and not _BYTES.fullmatch(self.type):
-            known = ", ".join((*_WIDTHS, "bytesN"))
+        if self.type not in _ITEMS and not _BYTES.fullmatch(self.type):
+            known = ", ".join((*_ITEMS, "bytesN"))
             raise InterfaceError(f"field {self.name}: no type {self.type!r}; known: {known}")
         if self.gap < 0:
             raise InterfaceError(f"field {self.name}: a gap has no {self.gap} bits")
@@ -156,10 +157,20 @@ class Field(Declaration):
         return f"{self.byte_offset}.{bit}" if bit or self.bits % 8 else f"{self.byte_offset}"
 
     @cached_property
+    def item(self) -> str:
+        """Format of its counts in module struct; a bool1 in a message is a bit of it."""
+        match = _BYTES.fullmatch(self.type)
+        return f"{match[1]}s" if match else _ITEMS[self.type]
+
+    @cached_property
+    def scaled(self) -> bool:
+        """Whether its values are counts divided by ``scale``; other types ignore a scale."""
+        return self.scale != 1.0 and self.item in "BHhI"
+
+    @cached_property
     def bits(self) -> int:
         """Width in bits."""
-        match = _BYTES.fullmatch(self.type)
-        return 8 * int(match[1]) if match else _WIDTHS[self.type]
+        return 1 if self.type == "bool1" else 8 * struct.calcsize(f"<{self.item}")
 
     @property
     def ends(self) -> tuple[float | None, float | None]:
@@ -190,42 +201,42 @@ class Field(Declaration):
             return -(1 << 15), (1 << 15) - 1
         return 0, (1 << self.bits) - 1
 
-    def encode(self, value: object, *, saturate: bool) -> int:
-        """Bits of ``value``: a number, a bool, bytes, or the name of a choice.
+    def count(self, value: object, *, saturate: bool) -> Value:
+        """What ``item`` carries for ``value``: a number, a bool, bytes, or the name of a choice.
 
         With ``saturate``, numbers beyond the type become its ends and not-a-number becomes 0 in
         an integer; without, they raise InterfaceError. A value of a wrong kind always does.
         """
         kind = self.type
         if kind.startswith("bytes"):
-            return self._encode_bytes(value)
+            return self._checked_bytes(value)
         number = float(value) if isinstance(value, (int, float)) else self._number(value)
         if kind == "f32":
             nearest = _nearest_f32(number)
             if math.isinf(nearest) and not math.isinf(number) and not saturate:
                 raise InterfaceError(f"field {self.name}: {value!r} is too large for a float32")
-            return int.from_bytes(struct.pack("<f", nearest), "little")
+            return nearest
         counts = number * self.scale
         low, high = self.raw_range
-        if not saturate and not low - 0.5 < counts < high + 0.5:
+        if not (saturate or low - 0.5 < counts < high + 0.5):
             raise InterfaceError(
                 f"field {self.name}: {value!r} does not fit; {self.type} carries "
                 f"{low / self.scale:g} to {high / self.scale:g} {self.unit}".rstrip()
             )
-        raw = 0 if math.isnan(counts) else _round_half_away(min(max(counts, low), high))
-        return raw & ((1 << self.bits) - 1)
+        if not low <= counts <= high:
+            counts = 0 if math.isnan(counts) else low if counts < low else high
+        whole = _round_half_away(counts)
+        return bool(whole) if kind == "bool1" else whole
+
+    def encode(self, value: object, *, saturate: bool) -> int:
+        """Bits of ``value``; it converts, saturates and raises as ``count`` does."""
+        data = struct.pack(f"<{self.item}", self.count(value, saturate=saturate))
+        return int.from_bytes(data, "little")
 
     def decode(self, raw: int) -> Value:
         """Value of the field's bits ``raw``."""
-        if self.type.startswith("bytes"):
-            return raw.to_bytes(self.bits // 8, "little")
-        if self.type == "bool1":
-            return bool(raw)
-        if self.type == "f32":
-            return float(struct.unpack("<f", raw.to_bytes(4, "little"))[0])
-        if raw > self.raw_range[1]:
-            raw -= 1 << self.bits
-        return raw if self.scale == 1.0 else raw / self.scale
+        (count,) = struct.unpack(f"<{self.item}", raw.to_bytes((self.bits + 7) // 8, "little"))
+        return count / self.scale if self.scaled else count  # type: ignore[no-any-return]
 
     def allows(self, value: Value, others: Mapping[str, Value]) -> bool:
         """Whether a decoded ``value`` is within the limits; ``others`` are its message's values."""
@@ -265,14 +276,14 @@ class Field(Declaration):
             return float(value)
         raise InterfaceError(f"field {self.name}: {value!r} is not a number ({self.type})")
 
-    def _encode_bytes(self, value: object) -> int:
+    def _checked_bytes(self, value: object) -> bytes:
         if not isinstance(value, bytes | bytearray | memoryview):
             raise InterfaceError(f"field {self.name}: {value!r} is not bytes")
         if len(value) != self.bits // 8:
             raise InterfaceError(
                 f"field {self.name}: has {len(value)} bytes, must have {self.bits // 8}"
             )
-        return int.from_bytes(value, "little")
+        return bytes(value)
 
 
 u8, u16, u32 = partial(Field, type="u8"), partial(Field, type="u16"), partial(Field, type="u32")

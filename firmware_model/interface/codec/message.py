@@ -19,6 +19,7 @@ from cubestack.firmware_model.interface.codec.field import (
     Value,
     suggestion,
 )
+from cubestack.firmware_model.interface.codec.layout import Layout
 from cubestack.firmware_model.interface.codec.letters import LetterProtocol
 from cubestack.firmware_model.interface.codec.register_pointer import PointerMap
 from cubestack.firmware_model.interface.codec.switches import Switches
@@ -101,8 +102,8 @@ class Message:
                 )
 
     @cached_property
-    def _names(self) -> frozenset[str]:
-        return frozenset(field.name for field in self.fields)
+    def _layout(self) -> Layout:
+        return Layout(self.fields, self.length, saturate=self.kind is MessageKind.TELEMETRY)
 
     def of(self, *fields: Field, ordered: tuple[tuple[str, str], ...] = ()) -> "Message":
         """This message with consecutive ``fields`` and pairs of ``ordered`` field names."""
@@ -133,32 +134,24 @@ class Message:
         Telemetry saturates; a telecommand's value that does not fit its type, and an unknown or
         missing field, raise InterfaceError. The node checks limits (``violations``).
         """
-        names = self._names
-        if values.keys() != names:
+        layout = self._layout
+        if values.keys() != layout.names:
             for name in values:
-                if name not in names:
+                if name not in layout.names:
                     hint = self._field_hint(name)
                     raise InterfaceError(f"{self.name} has no field {name!r}; {hint}")
             missing = [field.name for field in self.fields if field.name not in values]
             raise InterfaceError(f"{self.name} needs a value for {', '.join(missing)}")
-        saturate = self.kind is MessageKind.TELEMETRY
-        whole = 0
-        for field in self.fields:
-            try:
-                whole |= field.encode(values[field.name], saturate=saturate) << field.bit_offset
-            except InterfaceError as error:
-                raise InterfaceError(f"{self.name}: {error}") from None
-        return whole.to_bytes(self.length, "little")
+        try:
+            return layout.pack(values)
+        except InterfaceError as error:
+            raise InterfaceError(f"{self.name}: {error}") from None
 
     def unpack(self, data: bytes) -> dict[str, Value]:
         """Every field's value in ``data``; raises InterfaceError for a wrong length."""
         if len(data) != self.length:
             raise InterfaceError(f"{self.name} has {self.length} bytes, not {len(data)}")
-        whole = int.from_bytes(data, "little")
-        return {
-            field.name: field.decode((whole >> field.bit_offset) & ((1 << field.bits) - 1))
-            for field in self.fields
-        }
+        return self._layout.unpack(data)
 
     def violations(self, values: Mapping[str, Value]) -> list[tuple[Field, str]]:
         """Fields whose decoded value is not allowed, each with its error flag or ""."""

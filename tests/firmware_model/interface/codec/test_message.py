@@ -14,6 +14,8 @@ from cubestack.firmware_model.interface.codec.field import (
     Field,
     InterfaceError,
     bool1,
+    byte_array,
+    f32,
     i16,
     u8,
     u16,
@@ -59,6 +61,55 @@ def test_bytes_are_little_endian_and_bits_count_from_the_lowest() -> None:
 def test_message_round_trip_keeps_every_declared_bit(data: bytes) -> None:
     packed = MIXED.pack(**MIXED.unpack(data))
     assert packed == bytes((data[0], data[1] & 0x81)) + data[2:]
+
+
+COUNTS = (f32("f", ""), u8("a", ""), bool1("b", ""), bool1("c", "", gap=6), u32("e", ""))
+SCALED = (u16("a", "", scale=10), f32("f", "", scale=2), byte_array(2, "g", ""))
+
+ANY_VALUE = st.one_of(
+    st.booleans(),
+    st.integers(-2, 300),
+    st.integers(-(2**40), 2**40),
+    st.floats(),
+    st.floats(width=32).map(np.float32),
+    st.integers(-300, 300).map(np.int64),
+    st.binary(max_size=3),
+    st.sampled_from(["on", None, b"ab", np.True_, 0.5, -0.5, 1e39]),
+)
+
+
+def field_by_field(message: Message, values: dict[str, Any]) -> bytes:
+    whole, saturate = 0, message.kind is MessageKind.TELEMETRY
+    for field in message.fields:
+        whole |= field.encode(values[field.name], saturate=saturate) << field.bit_offset
+    return whole.to_bytes(message.length, "little")
+
+
+def result_of(call: Callable[[], bytes]) -> bytes | str:
+    try:
+        return call()
+    except InterfaceError as error:
+        return str(error)
+
+
+@pytest.mark.parametrize("number", [20, 200])
+@pytest.mark.parametrize("fields", [COUNTS, SCALED, MIXED.fields])
+@given(data=st.data())
+def test_message_has_the_bits_of_its_fields_or_their_first_error(
+    fields: tuple[Field, ...], number: int, data: st.DataObject
+) -> None:
+    message = Message(number, "M", "").of(*fields)
+    values = {field.name: data.draw(ANY_VALUE) for field in fields}
+    expected = result_of(lambda: field_by_field(message, values))
+    if not isinstance(expected, bytes):
+        assert result_of(lambda: message.pack(**values)) == f"M: {expected}"
+        return
+    assert message.pack(**values) == expected
+    whole, found = int.from_bytes(expected, "little"), message.unpack(expected)
+    assert list(found) == [field.name for field in fields]
+    for field in message.fields:
+        value = field.decode(whole >> field.bit_offset & ((1 << field.bits) - 1))
+        assert repr(found[field.name]) == repr(value)
 
 
 def test_telemetry_saturates_and_telecommands_do_not() -> None:
