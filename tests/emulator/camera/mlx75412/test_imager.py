@@ -184,3 +184,13 @@ def test_photograph_with_a_known_exposure_scales(striped: PictureScene) -> None:
     np.testing.assert_allclose(picture(known), striped.pixels // 2, atol=1)
     longer = replace(striped, exposure_ms=LONG.exposure_s * 8000 / 7)
     np.testing.assert_array_equal(picture(longer), striped.pixels * 7.0 // 8)
+
+
+def test_sensors_of_one_seed_share_an_imager_that_does_not_change() -> None:
+    shared, own = chip.imager_of(3), chip.Mlx75412Imager(3)
+    assert shared is chip.imager_of(3)
+    assert vars(shared).keys() == vars(own).keys()
+    for name, array in vars(shared).items():
+        np.testing.assert_array_equal(array, getattr(own, name))
+        assert not array.flags.writeable
+    assert not np.array_equal(shared._gain, chip.imager_of(4)._gain)
