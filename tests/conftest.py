@@ -101,6 +101,16 @@ def pytest_collection_finish() -> None:
     gc.freeze()
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> Iterator[Any]:
+    """Excludes what a module has imported and cached, too, or each collection would take longer."""
+    ended = yield
+    if nextitem is None or nextitem.path != item.path:
+        gc.collect()
+        gc.freeze()
+    return ended
+
+
 @pytest.fixture
 def profile() -> str:
     """Profile of the devices; tests of one profile are parametrised with its name."""
