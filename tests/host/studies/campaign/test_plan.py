@@ -154,7 +154,7 @@ def test_run_resume_report_and_replay(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, run: Run
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    Path("false.toml").write_text(PLAN_TEXT, "utf-8")
+    Path("false.toml").write_text(PLAN_TEXT.replace("block = 1", "block = 2"), "utf-8")
     lines = run("campaign", "false.toml", "--workers", "1", "--json").out.splitlines()
     points = [json.loads(line) for line in lines]
     assert [point["point"] for point in points] == [{"false_stars": 0}, {"false_stars": 10}]

@@ -16,6 +16,7 @@ from cubestack.host.studies.campaign.block import perform, rows_of
 from cubestack.host.studies.campaign.folder import PLAN, ROWS, Folder, count, replayed, run
 from cubestack.host.studies.campaign.plan import CampaignPlan, FrameBlock
 from cubestack.host.studies.campaign.statistics import rates
+from tests.tiers import quick_ones
 
 from ..test_workers import dask_cluster
 from .test_plan import PLAN_TEXT
@@ -35,18 +36,6 @@ def alone(small: Path, tmp_path_factory: pytest.TempPathFactory) -> Folder:
     rows = list(run(folder, 1))
     assert len(rows) == count(folder.plan) == 4
     return folder
-
-
-def devices() -> int:
-    """Number of kernels, each of a device that is in memory."""
-    return sum(type(one) is Kernel for one in gc.get_objects())
-
-
-def test_block_leaves_no_device_in_memory(alone: Folder) -> None:
-    gc.collect()
-    before = devices()
-    perform(next(iter(alone.plan.blocks())))
-    assert devices() == before
 
 
 def content(folder: Path) -> bytes:
@@ -191,9 +180,17 @@ def test_frame_of_two_cameras_has_two_rows() -> None:
     assert rows_of(FrameBlock(0, "cubesense", {"sensor": "sun"}, {}, 5, 1)) == 5
 
 
-@pytest.mark.parametrize("profile", ["published", "extended"])
-def test_campaign_block_runs_on_an_emulated_device(profile: str) -> None:
+def devices() -> int:
+    """Number of kernels, each of a device that is in memory."""
+    return sum(type(one) is Kernel for one in gc.get_objects())
+
+
+@pytest.mark.parametrize("profile", quick_ones(["published", "extended"], "extended"))
+def test_block_runs_on_an_emulated_device_and_leaves_none(profile: str) -> None:
+    gc.collect()
+    before = devices()
     plan = CampaignPlan(device="cubestar", frames=2, seed=3, options={"profile": profile})
     rows = perform(*plan.blocks())
     assert [row.outcome for row in rows] == ["right", "right"]
     assert "wall_ms" not in rows[0].result
+    assert devices() == before
