@@ -4,26 +4,27 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar, Protocol, TypedDict
+from typing import TYPE_CHECKING, ClassVar, Protocol, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.emulator.boards.firmware import Insight
-from cubestack.emulator.boards.gateware import with_gateware
-from cubestack.emulator.boards.pins import Pins
 from cubestack.emulator.bus.i2c import Forwarder, I2cBus, I2cTarget
 from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.faults.injector import Faults
 from cubestack.emulator.faults.sites import Sites
 from cubestack.emulator.i2cdev.direct import DirectI2c
 from cubestack.emulator.ports.line import DirectSerial
-from cubestack.emulator.rtl.contract import RtlEngine
-from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.emulator.sim.fpga_port import Microcontroller
 from cubestack.emulator.sim.power import PowerModel, PowerTable
 from cubestack.emulator.sim.processor import Program
 from cubestack.emulator.sim.virtual_time import Kernel
+
+if TYPE_CHECKING:
+    from cubestack.emulator.boards.firmware import Insight
+    from cubestack.emulator.boards.pins import Pins
+    from cubestack.emulator.rtl.contract import RtlEngine
+    from cubestack.emulator.rtl.wiring import Wiring
 
 NODE_PROTOCOL = "node protocol"
 
@@ -103,9 +104,9 @@ class Board(ABC):
     firmware: str = ""
     """Value of the option ``firmware``, with the hash, if the board runs a user's own firmware."""
 
-    engine: RtlEngine | None = None
-    insight: Insight | None = None
-    pins: Pins | None = None
+    engine: "RtlEngine | None" = None
+    insight: "Insight | None" = None
+    pins: "Pins | None" = None
     processor: Microcontroller
     program: Program
 
@@ -224,8 +225,12 @@ class Board(ABC):
         uarts, buses = {line.target: line.uart for line in self.lines}, {"i2c": self.i2c_bus}
         return Sites(self.kernel, self.processor, uarts, buses, self.power, self.engine)
 
-    def _fitted(self, wiring: Wiring) -> Wiring:
+    def _fitted(self, wiring: "Wiring") -> "Wiring":
         """``wiring`` with the design that the user has chosen, if any; see ``with_gateware``."""
+        if not any(self._gateware):
+            return wiring
+        from cubestack.emulator.boards.gateware import with_gateware
+
         return with_gateware(wiring, *self._gateware)
 
     def _node_link(self, link: Callable[[], NodeLink], baud: int, i2c_address: int) -> None:

@@ -5,12 +5,10 @@ A plain node is a microcontroller with a ``NodeProgram``, optionally with an FPG
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Generic, TypeVar, Unpack
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar, Unpack
 
 from cubestack.emulator.boards.contract import Board, BoardOptions
 from cubestack.emulator.camera.common.image_sensor import StarSensor
-from cubestack.emulator.rtl.factory import EngineKind, make_engine
-from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.emulator.sim.power import PowerTable
 from cubestack.emulator.sim.processor import Processor
 from cubestack.emulator.sim.virtual_time import PS_PER_S, PS_PER_US
@@ -19,6 +17,10 @@ from cubestack.firmware_model.mcu.costs import CostTable, Meter
 from cubestack.firmware_model.mcu.requests import CameraTransfer
 from cubestack.firmware_model.node.hardware import NodeHardware
 from cubestack.firmware_model.node.program import POWER_ON, NodeProgram
+
+if TYPE_CHECKING:
+    from cubestack.emulator.rtl.factory import EngineKind
+    from cubestack.emulator.rtl.wiring import Wiring
 
 
 @dataclass(eq=False)
@@ -104,7 +106,7 @@ class NodeBoard(Board, Generic[ProgramT, SceneT]):
         self,
         scene: SceneT,
         *,
-        engine: EngineKind = "auto",
+        engine: "EngineKind" = "auto",
         baud: int | None = None,
         **common: Unpack[BoardOptions],
     ) -> None:
@@ -124,6 +126,8 @@ class NodeBoard(Board, Generic[ProgramT, SceneT]):
         interface = self.program_type.interface
         wiring = self._wiring()
         if wiring is not None:
+            from cubestack.emulator.rtl.factory import make_engine
+
             self.engine = make_engine(self._fitted(wiring), engine)
             for memory in self.engine.memories.values():
                 self._scramble(memory)
@@ -177,7 +181,7 @@ class NodeBoard(Board, Generic[ProgramT, SceneT]):
         parts = self.supplies.parts
         checks.check_supplies(owner, {name: part.ma for name, part in parts.items()})
 
-    def _wiring(self) -> Wiring | None:
+    def _wiring(self) -> "Wiring | None":
         return None
 
     @property

@@ -5,7 +5,7 @@ In memory, radiation inverts bits, each with the same probability.
 
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import simpy
@@ -17,9 +17,11 @@ from cubestack.emulator.faults.injection import Injection, Mechanism, Report, ac
 from cubestack.emulator.faults.pins import PinFaults
 from cubestack.emulator.faults.pixels import FaultySource
 from cubestack.emulator.faults.sites import CameraSite, CoreSite
-from cubestack.emulator.rtl.contract import RtlEngine
 from cubestack.emulator.sim.power import PowerModel
 from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
+
+if TYPE_CHECKING:
+    from cubestack.emulator.rtl.contract import RtlEngine
 
 Steps = Generator[simpy.Event, Any, None]
 
@@ -36,7 +38,7 @@ class CameraFaults(Mechanism):
         self,
         env: Kernel,
         report: Report,
-        engine: RtlEngine,
+        engine: "RtlEngine",
         name: str,
         site: CameraSite,
         power: PowerModel,
@@ -92,7 +94,7 @@ class MemoryFaults(Mechanism):
         env: Kernel,
         report: Report,
         memory: NDArray[np.uint8],
-        engine: RtlEngine | None = None,
+        engine: "RtlEngine | None" = None,
         pins: Callable[[], PinFaults] | None = None,
         changed: Callable[[int, int], None] = lambda _first, _count: None,
     ) -> None:
@@ -226,7 +228,7 @@ class CoreFaults(Mechanism):
 class RegisterFaults(CoreFaults):
     """Flipped bits of the FPGAs' registers."""
 
-    core: RtlEngine
+    core: "RtlEngine"
 
     def prepare(self, injection: Injection) -> None:
         """Reject an unknown register, and an engine without registers; ValueError."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,11 +10,13 @@ from numpy.typing import NDArray
 from cubestack.emulator.bus.i2c import I2cBus
 from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.faults.declaration import Site
-from cubestack.emulator.rtl.contract import RtlEngine
 from cubestack.emulator.rtl.pixel_clock import PixelSource
 from cubestack.emulator.sim.fpga_port import Microcontroller
 from cubestack.emulator.sim.power import PowerModel
 from cubestack.emulator.sim.virtual_time import Kernel
+
+if TYPE_CHECKING:
+    from cubestack.emulator.rtl.contract import RtlEngine
 
 
 @dataclass(frozen=True)
@@ -45,7 +47,7 @@ class Sites:
     uarts: Mapping[str, Uart]
     buses: Mapping[str, I2cBus]
     supplies: PowerModel
-    engine: RtlEngine | None = None
+    engine: "RtlEngine | None" = None
     controls: tuple[str, ...] = ()  # pins that command the FPGAs
     # each of several FPGAs by its name: a control pin, and the level at which it does nothing
     fpgas: Mapping[str, tuple[str, int]] = field(default_factory=dict)

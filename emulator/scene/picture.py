@@ -4,16 +4,19 @@ import warnings
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from PIL import Image, ImageOps, UnidentifiedImageError
 
 from cubestack.emulator.scene.attitude import unit_quaternion
 from cubestack.emulator.scene.file import SceneError
 from cubestack.emulator.scene.fits import FITS_START, read_fits
 from cubestack.firmware_model.formats.untrusted import LARGEST_PICTURE, read_bytes, shown
 from cubestack.firmware_model.values import DeclaredValues, positive, vector, whole
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
 
 FORMATS = ("PNG", "JPEG", "TIFF")
 DEPTHS = (8, 10, 12, 14, 16)
@@ -99,6 +102,8 @@ def decode_picture(content: bytes, name: str) -> NDArray[np.uint8]:
         pixels = upper_bits(read_fits(content, name, MOST_PIXELS))
         pixels.flags.writeable = False
         return pixels
+    from PIL import Image, ImageOps, UnidentifiedImageError
+
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the size is checked here
@@ -122,7 +127,7 @@ def decode_picture(content: bytes, name: str) -> NDArray[np.uint8]:
     return pixels
 
 
-def _grey(name: str, image: Image.Image) -> NDArray[np.uint8]:
+def _grey(name: str, image: "Image") -> NDArray[np.uint8]:
     """8-bit grey values; colours by their luma, more bits by the upper 8 of those in use."""
     if image.mode.startswith("I;16"):
         return upper_bits(np.asarray(image).astype(np.uint16))

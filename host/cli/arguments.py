@@ -10,6 +10,7 @@ from typing import Any, NoReturn, TypeVar
 
 from cubestack.firmware_model.formats.untrusted import shown
 from cubestack.firmware_model.values import FLAG, Declaration, ListDeclaration
+from cubestack.host.errors import TargetError
 from cubestack.host.options import OUTPUT, Options, option_string
 
 FORCE = "--force"
@@ -47,11 +48,35 @@ class _Formatter(argparse.RawDescriptionHelpFormatter):
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser that prints its help as written, and errors in one line."""
+    """A parser that prints its help as written, and errors in one line.
 
-    def __init__(self, **options: Any) -> None:
+    ``declare`` adds its arguments when they are first needed, as that may load much code.
+    TargetError of it ends the command, whatever its options.
+    """
+
+    def __init__(self, declare: Callable[["Parser"], object] | None = None, **options: Any) -> None:
         super().__init__(formatter_class=_Formatter, **options)
         self.set_defaults(own_parser=self)
+        self._declare = declare
+        self.failed = ""
+
+    def declared(self) -> None:
+        """Add the arguments that have not been added."""
+        declare, self._declare = self._declare, None
+        if declare is not None:
+            try:
+                declare(self)
+            except TargetError as error:
+                self.failed = str(error)
+
+    def all_declared(self) -> "Parser":
+        """This parser with all arguments of all its commands."""
+        self.declared()
+        for action in self._actions:
+            if isinstance(action, argparse._SubParsersAction):
+                for command in action.choices.values():
+                    command.all_declared()
+        return self
 
     def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
         """The arguments; unknown ones are an error of the command that they belong to.
@@ -70,6 +95,9 @@ class Parser(argparse.ArgumentParser):
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """As argparse's; keeps the words for an error."""
         self._given = list(args or ())
+        self.declared()
+        if self.failed:
+            self.exit(2, f"{self.prog}: {self.failed}\n")
         return super().parse_known_args(args, namespace)
 
     def unknown(self, words: Sequence[str]) -> NoReturn:
@@ -134,13 +162,6 @@ class Parser(argparse.ArgumentParser):
 def _documents() -> str:
     """Where the documents are, by the distribution's repository."""
     return metadata("cubestack")["Project-URL"].rpartition(" ")[2] + "/tree/main/docs"
-
-
-def add_failed(commands: "argparse._SubParsersAction[Any]", name: str, error: str) -> None:
-    """Declare a command that ends with this error, whatever its options."""
-    command = commands.add_parser(name, help="does not load")
-    failed: Any = lambda *_: command.exit(2, f"{command.prog}: {error}\n")  # noqa: E731
-    command.parse_known_args = failed
 
 
 def add_value(parser: argparse._ActionsContainer, name: str, one: Any, **how: Any) -> None:

@@ -10,6 +10,7 @@ import sys
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from importlib.metadata import version
 from io import TextIOWrapper
 
@@ -29,7 +30,8 @@ LEVELS = (logging.WARNING, logging.INFO, logging.DEBUG)
 def make_parser(asked: str | None = None) -> Parser:
     """The parser of the command line.
 
-    Loading a command takes time: with ``asked``, all are listed but only that one is loaded.
+    With ``asked``, only that one is declared if there is one of that name, and no arguments until
+    they are needed.
     """
     parser = Parser(
         prog="cubestack",
@@ -51,14 +53,16 @@ def make_parser(asked: str | None = None) -> Parser:
     if asked in known:
         known = {asked: known[asked]}
     for heading, name, command in with_headings(known):
-        added = place.add_parser(name, help=command.summary)
+        place.add_parser(name, help=command.summary, declare=partial(_declare, command))
         place._choices_actions[-1].heading = heading  # type: ignore[attr-defined]
-        if asked in (None, name):
-            loaded = command.load()
-            added.description = _with_names(loaded.__doc__ or "")
-            loaded.add_arguments(added)
-            added.set_defaults(run=loaded.run)
-    return parser
+    return parser if asked is not None else parser.all_declared()
+
+
+def _declare(command: Listed, parser: Parser) -> None:
+    loaded = command.load()
+    parser.description = _with_names(loaded.__doc__ or "")
+    loaded.add_arguments(parser)
+    parser.set_defaults(run=loaded.run)
 
 
 def _with_names(text: str) -> str:

@@ -15,12 +15,13 @@ import argparse
 import json
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import partial
 from typing import Any
 
 from rich.table import Table
 
 from cubestack.firmware_model.values import number
-from cubestack.host.cli.arguments import add_failed, add_flag, add_options, add_value, chosen
+from cubestack.host.cli.arguments import Parser, add_flag, add_options, add_value, chosen
 from cubestack.host.cli.device_options import (
     add_engine_arguments,
     add_insight_arguments,
@@ -46,38 +47,51 @@ SHOWN = 40
 """Rows of a table."""
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    for command in add_devices(parser, lambda device: device.experiment and device.experiment()):
-        percent = number(
-            None, "exit status 1 if fewer percent of the results are right", 0, 100, metavar="PCT"
-        )
-        add_value(command, "min_right", percent)
+def add_arguments(parser: Parser) -> None:
+    percent = number(
+        None, "exit status 1 if fewer percent of the results are right", 0, 100, metavar="PCT"
+    )
+    add_devices(
+        parser,
+        lambda device: device.experiment,
+        lambda command: add_value(command, "min_right", percent),
+    )
 
 
 def add_devices(
-    parser: argparse.ArgumentParser, found: Callable[[AnyDevice], AnyExperiment | None]
-) -> list[argparse.ArgumentParser]:
-    """Declare the devices for which an experiment is ``found``, and its options; their parsers."""
-    parsers = []
+    parser: Parser,
+    found: Callable[[AnyDevice], Callable[[], AnyExperiment] | None],
+    further: Callable[[argparse.ArgumentParser], object] = lambda _command: None,
+) -> None:
+    """Declare the devices for which ``found`` returns what loads an experiment, and its options.
+
+    ``further`` declares more options of each.
+    """
     commands = parser.add_subparsers(dest="device", required=True, metavar="device")
     for name in device_names():
         try:
             device = registered(name)
-            experiment = found(device)
         except TargetError as error:  # must not keep the others from being measured
-            add_failed(commands, name, str(error))
+            commands.add_parser(name, help="does not load").failed = str(error)
             continue
-        if experiment is None:
-            continue
-        command = commands.add_parser(
-            device.name, help=device.summary, description=experiment.description
-        )
-        add_flag(command, "--json", "print one JSON object per result and nothing else")
-        add_options(command, experiment.options)
-        add_board(command, (device, experiment))
-        command.set_defaults(chosen=(device, experiment), others=options_of_others(device))
-        parsers.append(command)
-    return parsers
+        if (load := found(device)) is not None:
+            declare = partial(_declare, device, load, further)
+            commands.add_parser(name, help=device.summary, declare=declare)
+
+
+def _declare(
+    device: AnyDevice,
+    load: Callable[[], AnyExperiment],
+    further: Callable[[argparse.ArgumentParser], object],
+    command: Parser,
+) -> None:
+    experiment = load()
+    command.description = experiment.description
+    add_flag(command, "--json", "print one JSON object per result and nothing else")
+    add_options(command, experiment.options)
+    add_board(command, (device, experiment))
+    further(command)
+    command.set_defaults(chosen=(device, experiment), others=options_of_others(device))
 
 
 def add_board(parser: argparse.ArgumentParser, *measured: tuple[AnyDevice, AnyExperiment]) -> None:

@@ -101,6 +101,8 @@ class InsightFiles:
 
         Raises ValueError for a file that cannot be written.
         """
+        if self.profile is None and self.coverage is None:
+            return lambda _emulated: None
         from cubestack.emulator.iss.insight.reports import write_callgrind, write_lcov
 
         by_program: dict[Any, list[Observer]] = defaultdict(list)
@@ -124,10 +126,8 @@ class InsightFiles:
                     write(observers[0], stream)
                     stream.keep()  # even if the command ends with an error
 
-        if outputs:
-            files.callback(write_all)
-            return watch
-        return lambda _emulated: None
+        files.callback(write_all)
+        return watch
 
 
 def _merge(observers: list[Observer]) -> None:

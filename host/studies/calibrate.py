@@ -28,6 +28,7 @@ from cubestack.emulator.scene.sky import SkyScene
 from cubestack.firmware_model.values import whole
 from cubestack.host.calibration.camera import Camera, load_camera, save_camera
 from cubestack.host.calibration.stars import PARAMETERS, Fit, Sight, fit_camera
+from cubestack.host.cli.arguments import Parser
 from cubestack.host.cli.measure import add_devices, run_experiment
 from cubestack.host.clients.contract import DeviceClient, FoundStar
 from cubestack.host.devices.experiment import Experiment, Result
@@ -274,9 +275,9 @@ class StarCalibration(
         yield f"{wall_s:.1f} s wall time"
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: Parser) -> None:
     """Declare the devices that can be calibrated, each with options of its own."""
-    add_devices(parser, lambda device: device.study("calibrate"))
+    add_devices(parser, lambda device: device.studies.get("calibrate"))
 
 
 def run(args: argparse.Namespace) -> int:

@@ -23,7 +23,6 @@ from cubestack.emulator.camera.mt9m001.imager import NoiseTerms
 from cubestack.emulator.camera.mt9m001.sensor import Mt9m001
 from cubestack.emulator.faults.parts import flip_bits
 from cubestack.emulator.faults.sites import Sites
-from cubestack.emulator.rtl.factory import EngineKind
 from cubestack.emulator.scene.sky import Scene
 from cubestack.emulator.sim.firmware_loops import offer_firmware_loops
 from cubestack.emulator.sim.power import Part, PowerTable
@@ -79,7 +78,7 @@ class AramisBoard(Board):
         scene: Scene | SkyView,
         catalogue: Database | None,
         *,
-        engine: EngineKind = "auto",
+        engine: str = "auto",
         baud: int = INTERFACE.baud,
         noise: NoiseTerms | None = None,
         i2c_address: int = INTERFACE.i2c_address,

@@ -4,7 +4,6 @@ import re
 from collections.abc import Callable, Collection, Mapping
 from functools import cache, partial
 
-from cubestack.emulator.boards.gateware import fitted, load, with_gateware
 from cubestack.emulator.rtl.wiring import CameraPins, Level, MemoryPins, Wiring
 from cubestack.firmware_model.interface.cubesense import pins
 from cubestack.firmware_model.interface.cubesense.fpga import COMMANDS, Action, actions
@@ -60,6 +59,10 @@ def with_designs(wiring: Wiring, text: str, parameters: str = "") -> Wiring:
     ``text`` names a design of the whole pair, or is "sun=DESIGN", "nadir=DESIGN", or both with a
     comma between: each for one FPGA, whose ports are those of ``CubeSenseFpga``.
     """
+    if not text and not parameters:
+        return wiring
+    from cubestack.emulator.boards.gateware import fitted, load, with_gateware
+
     parts = [part.partition("=") for part in re.split(r",(?=(?:sun|nadir)=)", text)]
     if any(side not in SIDES for side, _, _ in parts):
         return with_gateware(wiring, text, parameters)
