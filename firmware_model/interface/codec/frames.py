@@ -10,12 +10,12 @@ ESCAPE = 0x1F
 START = 0x7F
 END = 0xFF
 FRONT, BACK = bytes((ESCAPE, START)), bytes((ESCAPE, END))
+_ONE, _TWO = bytes((ESCAPE,)), bytes((ESCAPE, ESCAPE))
 
 
 def encode_frame(payload: bytes) -> bytes:
     """The frame with ``payload``, which may be empty."""
-    escaped = payload.replace(bytes((ESCAPE,)), bytes((ESCAPE, ESCAPE)))
-    return FRONT + escaped + BACK
+    return FRONT + payload.replace(_ONE, _TWO) + BACK
 
 
 class FrameEvent(Enum):
@@ -69,20 +69,19 @@ class FrameDecoder:
         return FrameEvent.TOO_LONG if len(self._buffer) > self._max_length else FrameEvent.FRAME
 
     def takes(self, block: bytes) -> bool:
-        """Whether ``block`` is one frame without escapes in it, outside of another; then its
-        payload is in ``payload``, and ``feed`` of each byte would have done the same."""
+        """Whether ``block`` is one frame, outside of another; then its payload is in ``payload``,
+        and ``feed`` of each byte would have done the same."""
+        if self._inside or self.escaped or block[:2] != FRONT or block[-2:] != BACK:
+            return False
         payload = block[2:-2]
-        whole = (
-            len(payload) <= self._max_length
-            and not self.unfinished
-            and block[:2] == FRONT
-            and block[-2:] == BACK
-            and ESCAPE not in payload
-            and len(block) >= len(FRONT) + len(BACK)
-        )
-        if whole:
-            self.payload = payload
-        return whole
+        if ESCAPE in payload:
+            if ESCAPE in payload.replace(_TWO, b""):
+                return False
+            payload = payload.replace(_TWO, _ONE)
+        if len(payload) > self._max_length:
+            return False
+        self.payload = payload
+        return True
 
     @property
     def open_payload(self) -> bytes | None:
