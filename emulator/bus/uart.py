@@ -6,6 +6,7 @@ If the host's end has another format, both receivers decode the levels on the li
 
 from collections import deque
 from collections.abc import Callable, Generator
+from itertools import repeat
 from typing import Any, Protocol
 
 import simpy
@@ -110,7 +111,7 @@ class Uart:
 
     def host_writes(self, data: bytes) -> None:
         """Send ``data`` from the host, after the bytes that it is still sending."""
-        self._incoming.extend((byte, self.host_form) for byte in data)
+        self._incoming.extend(zip(data, repeat(self.host_form)))
         if self._incoming and not self._arrival.triggered:
             self._arrival.succeed()
 
@@ -150,7 +151,7 @@ class Uart:
                         self._incoming.popleft()
                         self._deliver(byte, self._env.now - self.byte_ps)
                     else:
-                        self.on_block(bytes(self._incoming.popleft()[0] for _ in range(count)))
+                        self.on_block(bytes([self._incoming.popleft()[0] for _ in range(count)]))
                 else:
                     yield from self._sample(byte, form)
                     self._incoming.popleft()
@@ -190,9 +191,9 @@ class Uart:
             return 1
         horizon = env.horizon()
         until = env.idle_until if horizon is None else min(env.idle_until, horizon)
-        most, count = (until - 1 - env.now) // self.byte_ps, 0
+        most, count, ours = (until - 1 - env.now) // self.byte_ps, 0, self.form
         for byte, form in self._incoming:
-            if count >= most or form != self.form:
+            if count >= most or (form is not ours and form != ours):  # comparing takes longer
                 break
             count += 1
             if byte == end:

@@ -41,9 +41,15 @@ class HostLine:
             self._sampler = None if form == self.uart.form else LineSampler(form)
             self._blocks.clear()
 
-    def arrival_ps(self, count: int = 1) -> int | None:
+    def next_ps(self) -> int | None:
+        """When the next byte arrives or has arrived; None without any."""
+        if self._blocks:
+            return self._blocks[0][1]
+        return None if self._sampler is None else self._sampler.next_ps()
+
+    def arrival_ps(self, count: int) -> int | None:
         """When the next ``count`` bytes, or all if fewer, have arrived; None without any."""
-        arrival = None if self._sampler is None else self._sampler.next_ps()
+        arrival = self.next_ps()
         for data, first_ps, byte_ps in self._blocks:
             arrival = first_ps + (min(count, len(data)) - 1) * byte_ps
             count -= len(data)
@@ -51,35 +57,43 @@ class HostLine:
                 break
         return arrival
 
-    def arrival_of(self, end: int, until_ps: int | None, most: int, silence_ps: int) -> int | None:
-        """When the block that is arriving has its first byte ``end``, or its last of ``most`` by
+    def arrival_of(
+        self, end: bytes, until_ps: int | None, most: int, silence_ps: int
+    ) -> int | None:
+        """When the block that is arriving has its first ``end``, or its last of ``most`` bytes by
         ``until_ps``; None without any, where the ends have different formats, or where a byte
-        takes longer than ``silence_ps``."""
+        takes longer than ``silence_ps``. ``end`` has one or two bytes."""
         if not self._blocks or self._sampler is not None:
             return None
         data, first_ps, byte_ps = self._blocks[0]
+        if data[:1] == end[1:]:  # the byte before may have begun an end
+            return None
         last = min(len(data), most) - 1 if byte_ps <= silence_ps else -1
         if until_ps is not None:
             last = min(last, (until_ps - first_ps) // byte_ps)
-        place = data.find(end, 0, last + 1) if last >= 0 else -1
-        return None if last < 0 else first_ps + (last if place < 0 else place) * byte_ps
+        if last < 0:
+            return None
+        place = data.find(end, 0, last + 1)
+        return first_ps + (last if place < 0 else place + len(end) - 1) * byte_ps
 
     def take(self, now_ps: int, max_bytes: int | None = None) -> bytes:
         """Return and remove at most ``max_bytes`` bytes that have arrived by ``now_ps``."""
         if self._sampler is not None:
             self._decode(self._sampler, now_ps)
-        taken = bytearray()
-        while self._blocks and (max_bytes is None or len(taken) < max_bytes):
+        taken = b""
+        while self._blocks:
             data, first_ps, byte_ps = self._blocks[0]
-            count = min(len(data), max(0, (now_ps - first_ps) // byte_ps + 1))
+            count = (now_ps - first_ps) // byte_ps + 1
             if max_bytes is not None:
                 count = min(count, max_bytes - len(taken))
-            taken += data[:count]
             if count < len(data):
-                self._blocks[0] = (data[count:], first_ps + count * byte_ps, byte_ps)
+                if count > 0:
+                    taken += data[:count]
+                    self._blocks[0] = (data[count:], first_ps + count * byte_ps, byte_ps)
                 break
+            taken += data
             self._blocks.popleft()
-        return bytes(taken)
+        return taken
 
     def move(self, uart: Uart) -> None:
         """Connect to another device's ``uart``, with the same format of this end."""
@@ -132,41 +146,46 @@ class DirectSerial:
     def write(self, data: bytes) -> None:
         self._line.uart.host_writes(data)
 
-    def read_on(self, end: int, max_bytes: int, timeout_s: float) -> bytes:
-        """Read as ``read`` does, and go on to the next byte ``end`` where nothing happens before.
+    def read_on(self, end: bytes, max_bytes: int, timeout_s: float) -> bytes:
+        """Read as ``read`` does, and go on to the next ``end`` where nothing happens before.
 
         Between two bytes of a block that the device sends, a host that only waits for ``end``
         changes nothing. Up to the next event, or with an observer of steps, each byte counts.
         """
-        data = self.read(max_bytes, timeout_s)
-        horizon = self._env.horizon()
-        if not data or end in data or self._env.watched:
-            return data
-        silence_ps = int(timeout_s * PS_PER_S)
-        arrival = self._line.arrival_of(end, horizon, max_bytes - len(data), silence_ps)
-        if arrival is not None:
-            self._env.advance_to(arrival)
-            data += self._line.take(arrival, max_bytes - len(data))
-        return data
+        if not self._await_byte(timeout_s):
+            return b""
+        env = self._env
+        if not env.watched:
+            silence_ps = int(timeout_s * PS_PER_S)
+            arrival = self._line.arrival_of(end, env.horizon(), max_bytes, silence_ps)
+            if arrival is not None:
+                env.advance_to(arrival)
+        return self._line.take(env.now, max_bytes)
 
     def read(self, max_bytes: int, timeout_s: float) -> bytes:
         """Wait up to ``timeout_s`` of virtual time for a byte; returns those that have arrived."""
-        env = self._env
-        deadline = env.now + int(timeout_s * PS_PER_S)
+        arrived = self._await_byte(timeout_s)
+        return self._line.take(self._env.now, max_bytes) if arrived else b""
+
+    def _await_byte(self, timeout_s: float) -> bool:
+        env, line = self._env, self._line
+        now = env.now
+        deadline = now + int(timeout_s * PS_PER_S)
         try:
-            while (arrival := self._line.arrival_ps()) is None or arrival > env.now:
-                target = deadline if arrival is None else min(deadline, arrival)
-                if env.now >= target:
-                    return b""
+            while (arrival := line.next_ps()) is None or arrival > now:
+                target = deadline if arrival is None or arrival > deadline else arrival
+                if now >= target:
+                    return False
                 horizon = env.horizon()
                 if horizon is not None and horizon < target:
                     env.idle_until = target
                     env.step()
                 else:
                     env.advance_to(target)
+                now = env.now
         finally:
             env.idle_until = 0
-        return self._line.take(env.now, max_bytes)
+        return True
 
     def close(self) -> None:
         """Disconnect; later output of the device is lost."""

@@ -1,5 +1,6 @@
 """Virtual time as an integer number of picoseconds, its kernel, and exact clock conversion."""
 
+from functools import partial
 from itertools import count
 from time import monotonic_ns
 
@@ -21,6 +22,8 @@ class Kernel(simpy.Environment):
 
     def __init__(self, initial_time: int = 0) -> None:
         super().__init__(initial_time)
+        # SimPy binds what creates events only for objects of its own class.
+        vars(self).update(event=partial(simpy.Event, self), timeout=partial(simpy.Timeout, self))
         self._holders = set[str]()
         self._since_ns = 0
 
@@ -61,7 +64,7 @@ class Kernel(simpy.Environment):
     @property
     def watched(self) -> bool:
         """Whether a trace or a debugger observes each step."""
-        return "step" in vars(self)
+        return "step" in self.__dict__
 
     def advance_to(self, time_ps: int) -> None:
         """Run all events before ``time_ps``, then stop at that time; a past time does nothing.
@@ -70,7 +73,8 @@ class Kernel(simpy.Environment):
         """
         if time_ps <= self._now:
             return
-        if self.peek() >= time_ps and not self.watched:
+        queue = self._queue
+        if (not queue or queue[0][0] >= time_ps) and not self.watched:
             self._now = time_ps  # no event until then, and no observer of steps
             return
         arrival = self.urgent(time_ps)  # limits the look-ahead of others

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 from cubestack.firmware_model.interface.codec.field import Value
 from cubestack.firmware_model.interface.codec.frames import (
-    END,
+    BACK,
     FrameDecoder,
     FrameEvent,
     encode_frame,
@@ -115,7 +115,7 @@ class NodeClient(Client):
             for byte in self._unread:
                 if self._decoder.feed(byte) is FrameEvent.FRAME:
                     return self._decoder.payload
-            data = read_frame_part(self._transport, END, self._timeout_s)
+            data = read_frame_part(self._transport, BACK, self._timeout_s)
             if not data:
                 return None
             if self._decoder.takes(data):

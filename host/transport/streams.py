@@ -42,9 +42,9 @@ def port_of(line: Transport) -> Transport:
     return beneath
 
 
-def read_frame_part(line: Transport, end: int, timeout_s: float) -> bytes:
-    """Read as ``line`` does; a line in virtual time goes on to the next byte ``end``, before which
-    no frame is whole."""
+def read_frame_part(line: Transport, end: bytes, timeout_s: float) -> bytes:
+    """Read as ``line`` does; a line in virtual time goes on to the next ``end``, one or two bytes
+    before which no frame is whole."""
     read_on = getattr(line, "read_on", None)
     if read_on is None:
         return line.read(READ_BYTES, timeout_s)

@@ -17,6 +17,7 @@ from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
 from cubestack.firmware_model.formats.i2c_socket import Call, pack_ioctl, pack_read
 from cubestack.firmware_model.formats.linux_i2c import Ioctl
 from cubestack.firmware_model.interface.codec.frames import (
+    BACK,
     END,
     FrameDecoder,
     FrameEvent,
@@ -142,7 +143,7 @@ def frames_in(
         kernel.timeout(after).callbacks.append(lambda _event, data=data: uart.send(data))
     for after in others:
         kernel.timeout(after)
-    read = partial(serial.read_on, END) if whole else serial.read
+    read = partial(serial.read_on, BACK) if whole else serial.read
     decoder, found, failures = FrameDecoder(20), [], 0
     while failures < 3:
         data = read(64, timeout_s)
@@ -228,10 +229,10 @@ def test_observer_of_steps_sees_every_byte(device, serial):
     device.uart.send(b"abcdef")
     steps = []
     vars(device.kernel)["step"] = lambda: (steps.append(0), Kernel.step(device.kernel))
-    assert serial.read_on(ord("f"), 64, 1.0) == b"a"
+    assert serial.read_on(b"f", 64, 1.0) == b"a"
     assert steps
     del vars(device.kernel)["step"]
-    assert serial.read_on(ord("e"), 64, 1.0) == b"bcde"
+    assert serial.read_on(b"e", 64, 1.0) == b"bcde"
     assert device.kernel.now == 5 * BYTE
 
 
