@@ -61,24 +61,27 @@ class Register(Component):
 
 @pytest.mark.parametrize(
     ("width", "function", "result", "tables"),
-    [
-        (1, lambda a, b: a, 1, 0),
-        (1, lambda a, b: ~a, 1, 1),
-        (3, lambda a, b: a.all(), 1, 1),
-        (3, lambda a, b: ~a.xor(), 1, 1),
-        (4, lambda a, b: a.all(), 1, 2),
-        (2, lambda a, b: (a + b)[:2], 2, 3),
-        (4, lambda a, b: (a + b)[:4], 4, 7),
-        (4, lambda a, b: a - a, 4, 0),
-        (4, lambda a, b: a == a, 1, 0),
-        (8, lambda a, b: (a < b) ^ (b > a), 1, 0),
-    ],
+    quick(
+        [
+            (4, lambda a, b: a.all(), 1, 2),
+            (1, lambda a, b: a, 1, 0),
+            (1, lambda a, b: ~a, 1, 1),
+            (4, lambda a, b: (a + b)[:4], 4, 7),
+            (3, lambda a, b: a.all(), 1, 1),
+            (3, lambda a, b: ~a.xor(), 1, 1),
+            (8, lambda a, b: (a < b) ^ (b > a), 1, 0),
+            (2, lambda a, b: (a + b)[:2], 2, 3),
+            (4, lambda a, b: a - a, 4, 0),
+            (4, lambda a, b: a == a, 1, 0),
+        ],
+        3,
+    ),
 )
 def test_area_count_equals_hand_counted_tables(width, function, result, tables):
     assert count_tiles(Function(width, function, result)) == TileCount(tables, 0)
 
 
-@pytest.mark.parametrize("width", [5, 7, 9, 20])
+@pytest.mark.parametrize("width", quick([9, 5, 7, 20], 1))
 def test_wide_gates_take_few_tiles(width):
     """Each table but one takes in two more inputs at best, and one more at worst."""
     tables = count_tiles(Function(width, lambda a, b: a.any())).tables
@@ -100,7 +103,7 @@ def tiles(name):
     return count_tiles(DESIGNS[name].make())
 
 
-@pytest.mark.parametrize(("name", "design", "file"), quick(ROWS, 3))
+@pytest.mark.parametrize(("name", "design", "file"), quick(ROWS, 2))
 def test_design_areas_equal_the_recorded_ones(name, design, file):
     flow_checks.area_is_as_recorded(name, design, file)
 
@@ -168,6 +171,7 @@ def test_recorded_clock_rates_are_of_the_designs_clocks():
             assert set(entry.get("ice40_fmax_mhz", {})) <= clocks
 
 
+@pytest.mark.slow
 def test_gray_counter_takes_more_tiles_than_the_matrix_one():
     gray, matrix = tiles("Gray counter of 307200"), tiles("matrix counter 640 x 480")
     assert gray.flip_flops == matrix.flip_flops + 1

@@ -111,10 +111,9 @@ def finds(name: str, folder: Path) -> None:
     assert [result.name for result in report.failed] == [name]
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::amaranth.hdl.UnusedElaboratable")
-@pytest.mark.parametrize(
-    "name", quick_ones([name for name in CHECKS if name != WHOLE], "presents_the_nadir_scan")
-)
+@pytest.mark.parametrize("name", [name for name in CHECKS if name != WHOLE])
 def test_planted_bug_is_found_by_its_check(name: str, tmp_path: Path) -> None:
     finds(name, tmp_path)
 

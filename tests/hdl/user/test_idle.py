@@ -14,7 +14,6 @@ from cubestack.hdl.cubestar.top import CubeStarTop
 from cubestack.hdl.flow.tools import have_yosys
 from cubestack.hdl.user.idle import cubes_without, prove_idle
 from cubestack.hdl.user.strides import proved_strides
-from tests.tiers import quick_ones
 
 from .designs import WORKING, load_design
 
@@ -26,7 +25,8 @@ COLUMNS, ROWS = 16, 4
 RESTLESS = {"block_ram": "register", "synchronous_reset": "register"}
 
 
-@pytest.mark.parametrize("name", quick_ones(WORKING, "block_ram"))
+@pytest.mark.slow
+@pytest.mark.parametrize("name", WORKING)
 def test_camera_clock_is_idle_where_it_provably_has_no_effect(name: str) -> None:
     wiring = cubestar_wiring(CubeStarTop(COLUMNS, ROWS))
     (camera,) = wiring.cameras

@@ -6,6 +6,7 @@ from cubestack.firmware_model.interface.pins import Pin
 from cubestack.hdl.flow.generate import rtlil_text, verilog_text
 from cubestack.hdl.flow.tools import have_yosys
 from cubestack.hdl.user import GatewareError, load_gateware
+from tests.tiers import quick
 
 pytestmark = pytest.mark.skipif(not have_yosys(), reason="no whole Yosys")
 
@@ -56,14 +57,33 @@ def test_parameter_changes_the_design(tmp_path):
 
 @pytest.mark.parametrize(
     ("old", "new", "message"),
-    [
-        ("input CLK", "input clk, input CLK_", "pin CLK: wanted input of 1 bit, found clk: case"),
-        ("input CLK", "input CLK, input SYS", "pin SYS: found input of 1 bit, but the board has"),
-        ("[3:0] LEDS", "[4:0] LEDS", "pin LEDS: wanted output of 4 bits, found output of 5 bits"),
-        ("inout [1:0] BUS", "output [1:0] BUS", "pin BUS: wanted inout of 2 bits, found output"),
-        (", output OUT", ", output OUT_", "pin OUT: wanted output of 1 bit, found none"),
-        ("on ? LEDS[1:0] : 2'bzz", "{on ? on : 1'bz, OUT ? on : 1'bz}", "different signals"),
-    ],
+    quick(
+        [
+            (
+                "input CLK",
+                "input clk, input CLK_",
+                "pin CLK: wanted input of 1 bit, found clk: case",
+            ),
+            (
+                "input CLK",
+                "input CLK, input SYS",
+                "pin SYS: found input of 1 bit, but the board has",
+            ),
+            (
+                "[3:0] LEDS",
+                "[4:0] LEDS",
+                "pin LEDS: wanted output of 4 bits, found output of 5 bits",
+            ),
+            (
+                "inout [1:0] BUS",
+                "output [1:0] BUS",
+                "pin BUS: wanted inout of 2 bits, found output",
+            ),
+            (", output OUT", ", output OUT_", "pin OUT: wanted output of 1 bit, found none"),
+            ("on ? LEDS[1:0] : 2'bzz", "{on ? on : 1'bz, OUT ? on : 1'bz}", "different signals"),
+        ],
+        3,
+    ),
 )
 def test_misfit_is_one_line_that_names_the_pin(tmp_path, old, new, message):
     assert old in GOOD
