@@ -55,6 +55,7 @@ class PowerModel:
         self._on = dict.fromkeys(table.channels, True)
         self._latch_up_ma = dict.fromkeys(table.channels, 0.0)
         self._failed: dict[str, float] = {}
+        self._currents: dict[str | None, float] = {}  # since the latest change, as far as needed
         self._tripped = dict.fromkeys(table.channels, False)
         self._charge_ma_ps = 0.0
         self._since_ps = env.now
@@ -70,7 +71,9 @@ class PowerModel:
         if state not in parts[part].ma:
             raise ValueError(f"{part} has no state {state!r}, only {sorted(parts[part].ma)}")
         self._integrate()
-        self._states[part] = state
+        if self._states[part] != state:
+            self._states[part] = state
+            self._currents.clear()
         self._compare()
 
     def switch(self, channel: str, on: bool) -> None:
@@ -81,6 +84,7 @@ class PowerModel:
         self._integrate()
         self._on[channel] = on
         self._latch_up_ma[channel] = self._failed.get(channel, 0.0) if on else 0.0
+        self._currents.clear()
         self._compare()
         self.on_switch(channel, on)
 
@@ -100,10 +104,17 @@ class PowerModel:
         if self._on[channel]:
             self._integrate()
             self._latch_up_ma[channel] = extra_ma
+            self._currents.clear()
             self._compare()
 
     def current_ma(self, channel: str | None = None) -> float:
         """Current of ``channel``, or of the whole stack, in mA."""
+        known = self._currents.get(channel)
+        if known is None:
+            known = self._currents[channel] = self._sum_ma(channel)
+        return known
+
+    def _sum_ma(self, channel: str | None) -> float:
         if channel is not None:
             self._check_channel(channel)
         total = 0.0
