@@ -118,13 +118,14 @@ class SatelliteLink(ABC):
             for byte in data:
                 self.uart_byte(byte)
             return
-        self.meter.charge(uart_interrupt=len(data))
+        self.meter.charge(uart_interrupt=len(data), host_message=1)
         self._uart_message(self._decoder.payload)
 
     def uart_byte(self, byte: int) -> None:
         self.meter.charge(uart_interrupt=1)
         match self._decoder.feed(byte):
             case FrameEvent.FRAME | FrameEvent.TOO_LONG:  # the kept front is too long as well
+                self.meter.charge(host_message=1)
                 self._uart_message(self._decoder.payload)
             case FrameEvent.INCOMPLETE:
                 self._raise(self.flags.incomplete)
@@ -138,7 +139,6 @@ class SatelliteLink(ABC):
             self._raise(self.flags.timeout)
 
     def _uart_message(self, payload: bytes) -> None:
-        self.meter.charge(host_message=1)
         if not payload:
             self._raise(self.flags.protocol_error)
         elif payload[0] & TELEMETRY_BIT:

@@ -6,6 +6,7 @@ can be thinned until every pair agrees. Two centroids with one identity then con
 """
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from math import nan
 from typing import Self
 
@@ -41,12 +42,12 @@ class Identification:
     #: tangents of measured field angles over true ones; 1 where the focal length is right
     scale: float = 1.0
 
-    @property
+    @cached_property
     def matched(self) -> NDArray[np.intp]:
         """Centroids that have an identity, rising."""
         return np.flatnonzero(self.stars != NONE)
 
-    @property
+    @cached_property
     def confidence(self) -> NDArray[np.float32]:
         """(n,) votes over the largest number possible; 0 for a centroid without identity."""
         most = max(len(self.stars) - 1, 1)
