@@ -359,11 +359,11 @@ def _measure(
     cubestar, client = emulated.client, emulated.client.client
     client.command("ClearErrorFlags")
     known = picture_truth
-    if known is None:
-        known = emulated.scene.truth(emulated.board.kernel.now)
     if options.mode == "lis":
         client.command("setIDMode", IdMode=IdMode.LOST_IN_SPACE)
     else:
+        if known is None:
+            known = emulated.scene.truth(emulated.board.kernel.now)
         if known is None:
             raise ValueError(f"--mode {options.mode} needs a scene whose attitude is known")
         client.command("setIDMode", IdMode=IdMode.TRACKING)
