@@ -43,16 +43,20 @@ class FrameNoise:
 
     def normals(self, first: int, count: int) -> Normals:
         """Normal numbers, mean 0 and variance 1, of the same pixels, (count,)."""
-        words = self.words(first, count)
-        tail = (words & np.uint32(0x7FFFFFFF)).astype(np.int32).astype(np.float32)
-        tail += np.float32(LOWEST)
-        levels, slopes = pieces()
-        segment = (tail.view(np.int32) >> SHIFT) - FIRST
-        size = slopes[segment] * tail
-        size += levels[segment]
-        sign: NDArray[np.uint32] = words & np.uint32(0x80000000)
-        signed: Normals = (size.view(np.uint32) ^ sign).view(np.float32)
-        return signed
+        return normals_of(self.words(first, count))
+
+
+def normals_of(words: NDArray[np.uint32]) -> Normals:
+    """Normal numbers of uniform 32 bits, same shape."""
+    tail = (words & np.uint32(0x7FFFFFFF)).astype(np.int32).astype(np.float32)
+    tail += np.float32(LOWEST)
+    levels, slopes = pieces()
+    segment = (tail.view(np.int32) >> SHIFT) - FIRST
+    size = slopes[segment] * tail
+    size += levels[segment]
+    sign: NDArray[np.uint32] = words & np.uint32(0x80000000)
+    signed: Normals = (size.view(np.uint32) ^ sign).view(np.float32)
+    return signed
 
 
 @cache

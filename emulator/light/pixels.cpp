@@ -1,9 +1,12 @@
 // Grey values of an image sensor: pixels.py, one row at a time.
 //
 // Every operation is that of the reference, in its order and precision: no fused multiplication, no
-// other association. So the result is equal to the bit.
+// other association. So the result is equal to the bit. Where pixels are alike, the grey values of
+// most that have little light are known from their random numbers, and are taken from a table.
 
+#include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <vector>
 
 #include "noise.h"
@@ -18,77 +21,141 @@ struct PixelModel {
     int64_t hots, repairs;
     int32_t columns, noisy, shot_of_light;
     float dark, shot, steady, black, offset, full_scale, step;
+    float dim;  // light up to which the table holds
+    const uint8_t *dim_values;  // by the highest bits of a pixel's number; none: not known
     light::NoiseSource noise;
+};
+
+constexpr int SEGMENT = 16;  // pixels of a row that are computed together, or taken from the table
+constexpr int TABLE_BITS = 14;
+constexpr uint8_t UNKNOWN = 255;
+
+// Pixels of row ``y`` from column ``first`` up to ``end``; ``start`` is the place of the row's first.
+struct Span {
+    int64_t start;
+    int y, first, end;
 };
 
 // Buffers of one row.
 struct Row {
     explicit Row(int columns)
-        : charge(columns), signal(columns),
-          numbers(columns + 2 * light::NUMBERS_OF_BLOCK) {}
-    std::vector<float> charge, signal;
+        : charge(columns), signal(columns), numbers(columns + 2 * light::NUMBERS_OF_BLOCK),
+          computed(columns / SEGMENT + 1) {}
+    std::vector<float> charge, signal, means;
     std::vector<uint32_t> numbers;
-    std::vector<float> means;
+    std::vector<uint8_t> computed;
+    std::vector<Span> spans;
 };
 
-void add_charge(const PixelModel &model, int64_t start, float *__restrict charge) {
-    const int columns = model.columns;
-    const float *__restrict light = model.light + start;
+void add_charge(const PixelModel &model, const Span &span, float *__restrict charge) {
+    const float *__restrict light = model.light + span.start;
     if (model.response) {
-        const float *__restrict response = model.response + start;
-        for (int x = 0; x < columns; ++x) charge[x] = light[x] * response[x];
+        const float *__restrict response = model.response + span.start;
+        for (int x = span.first; x < span.end; ++x) charge[x] = light[x] * response[x];
     } else {
-        for (int x = 0; x < columns; ++x) charge[x] = light[x];
+        for (int x = span.first; x < span.end; ++x) charge[x] = light[x];
     }
     const float dark = model.dark;
     if (model.dark_share) {
-        const float *__restrict share = model.dark_share + start;
-        for (int x = 0; x < columns; ++x) charge[x] = charge[x] + share[x] * dark;
+        const float *__restrict share = model.dark_share + span.start;
+        for (int x = span.first; x < span.end; ++x) charge[x] = charge[x] + share[x] * dark;
     } else {
-        for (int x = 0; x < columns; ++x) charge[x] = charge[x] + dark;
+        for (int x = span.first; x < span.end; ++x) charge[x] = charge[x] + dark;
     }
 }
 
-void add_noise(const PixelModel &model, int64_t start, Row &row) {
-    const int columns = model.columns;
+// The numbers of the row that begins at ``start``; the first is returned.
+const uint32_t *draw(const PixelModel &model, int64_t start, uint32_t *numbers) {
     const int64_t block = start / light::NUMBERS_OF_BLOCK;
     const int skipped = (int)(start % light::NUMBERS_OF_BLOCK);
-    for (int n = 0; n < skipped + columns; n += light::NUMBERS_OF_BLOCK)
-        light::philox(model.noise, block + n / light::NUMBERS_OF_BLOCK, row.numbers.data() + n);
-    const uint32_t *__restrict numbers = row.numbers.data() + skipped;
-    float *__restrict signal = row.signal.data();
-    for (int x = 0; x < columns; ++x) signal[x] = light::normal(model.noise, numbers[x]);
-    const float *__restrict charge = row.charge.data();
-    const float *__restrict light = model.light + start;
+    for (int n = 0; n < skipped + model.columns; n += light::NUMBERS_OF_BLOCK)
+        light::philox(model.noise, block + n / light::NUMBERS_OF_BLOCK, numbers + n);
+    return numbers + skipped;
+}
+
+void add_noise(const PixelModel &model, const Span &span, const uint32_t *__restrict numbers,
+               const float *__restrict charge, float *__restrict signal) {
+    for (int x = span.first; x < span.end; ++x) signal[x] = light::normal(model.noise, numbers[x]);
+    const float *__restrict light = model.light + span.start;
     const float shot = model.shot, steady = model.steady;
     if (model.shot_of_light)
-        for (int x = 0; x < columns; ++x)
+        for (int x = span.first; x < span.end; ++x)
             signal[x] = signal[x] * std::sqrt(charge[x] * shot + steady) + charge[x];
     else
-        for (int x = 0; x < columns; ++x)
+        for (int x = span.first; x < span.end; ++x)
             signal[x] = signal[x] * std::sqrt((charge[x] - light[x]) * shot + steady) + charge[x];
 }
 
-void amplify(const PixelModel &model, int64_t start, int y, float *__restrict signal) {
-    const int columns = model.columns;
-    const float *__restrict gain = model.gain + (y & 1) * columns;
+void amplify(const PixelModel &model, const Span &span, float *__restrict signal) {
+    const float *__restrict gain = model.gain + (span.y & 1) * model.columns;
     const float black = model.black;
-    for (int x = 0; x < columns; ++x) signal[x] = (signal[x] - black) * gain[x];
+    for (int x = span.first; x < span.end; ++x) signal[x] = (signal[x] - black) * gain[x];
     if (model.pattern) {
-        const float *__restrict pattern = model.pattern + start;
-        for (int x = 0; x < columns; ++x) signal[x] = signal[x] + pattern[x];
+        const float *__restrict pattern = model.pattern + span.start;
+        for (int x = span.first; x < span.end; ++x) signal[x] = signal[x] + pattern[x];
     }
     const float offset = model.offset;
-    for (int x = 0; x < columns; ++x) signal[x] = signal[x] + offset;
+    for (int x = span.first; x < span.end; ++x) signal[x] = signal[x] + offset;
 }
 
-void quantise(const PixelModel &model, const float *__restrict signal, uint8_t *__restrict grey) {
-    const float full_scale = model.full_scale, step = model.step;
-    for (int x = 0; x < model.columns; ++x) {
+void quantise(const PixelModel &model, const Span &span, const float *__restrict signal,
+              uint8_t *__restrict grey) {
+    const float full_scale = model.full_scale;
+    for (int x = span.first; x < span.end; ++x) {
         float value = signal[x] + 0.5f;
         value = value > 0.0f ? value : 0.0f;
         value = value < full_scale ? value : full_scale;
-        grey[x] = (uint8_t)(int32_t)(value * step);
+        grey[x] = (uint8_t)(int32_t)(value * model.step);
+    }
+}
+
+// Ascending places of special pixels; those of the present row are ``first`` up to ``end``.
+struct Places {
+    const int64_t *places;
+    int64_t count, first = 0, end = 0;
+
+    // Goes on to the row that begins at ``start``; rows come in order.
+    void enter(int64_t start, int columns) {
+        for (first = end; first < count && places[first] < start;) ++first;
+        for (end = first; end < count && places[end] < start + columns;) ++end;
+    }
+};
+
+// Takes ``grey`` from the table, and tells the segments of the row in which that is not enough: a
+// pixel has more than dim light, is a special one or has a number with several values.
+void look_up(const PixelModel &model, int64_t start, const uint32_t *__restrict numbers,
+             const Places &hot, const Places &repaired, uint8_t *__restrict grey,
+             uint8_t *__restrict computed) {
+    const int columns = model.columns;
+    const float *light = model.light + start;
+    for (int first = 0; first < columns; first += SEGMENT) {
+        const int end = std::min(first + SEGMENT, columns);
+        float brightest = 0.0f;
+        for (int x = first; x < end; ++x) brightest = light[x] > brightest ? light[x] : brightest;
+        uint8_t greatest = 0;
+        for (int x = first; x < end; ++x) {
+            grey[x] = model.dim_values[numbers[x] >> (32 - TABLE_BITS)];
+            greatest = std::max(greatest, grey[x]);
+        }
+        computed[first / SEGMENT] = brightest > model.dim || greatest == UNKNOWN;
+    }
+    for (int64_t n = hot.first; n < hot.end; ++n) computed[(hot.places[n] - start) / SEGMENT] = 1;
+    for (int64_t n = repaired.first; n < repaired.end; ++n)
+        for (int side = -1; side <= 1; ++side)
+            computed[(repaired.places[n] - start + side) / SEGMENT] = 1;
+}
+
+// The segments to compute, adjacent ones as one span.
+void find_spans(int64_t start, int y, int columns, const uint8_t *computed,
+                std::vector<Span> &spans) {
+    spans.clear();
+    for (int first = 0; first < columns; first += SEGMENT) {
+        if (!computed[first / SEGMENT]) continue;
+        const int end = std::min(first + SEGMENT, columns);
+        if (!spans.empty() && spans.back().end == first)
+            spans.back().end = end;
+        else
+            spans.push_back({start, y, first, end});
     }
 }
 
@@ -99,28 +166,36 @@ extern "C" void light_grey_values(const PixelModel *model, int32_t first, int32_
                                   uint8_t *grey) {
     const int columns = model->columns;
     Row row(columns);
-    int64_t hot = 0, repair = 0;
-    while (hot < model->hots && model->hot[hot] < (int64_t)first * columns) ++hot;
-    while (repair < model->repairs && model->repaired[repair] < (int64_t)first * columns) ++repair;
-    for (int y = first; y < end; ++y) {
-        const int64_t start = (int64_t)y * columns, next = start + columns;
-        add_charge(*model, start, row.charge.data());
-        for (; hot < model->hots && model->hot[hot] < next; ++hot)
-            row.charge[model->hot[hot] - start] += model->hot_charge[hot];
-        if (model->noisy)
-            add_noise(*model, start, row);
-        else
-            row.signal = row.charge;
-        float *signal = row.signal.data();
-        amplify(*model, start, y, signal);
+    Places hot{model->hot, model->hots}, repaired{model->repaired, model->repairs};
+    for (int y = first; y < end; ++y, grey += columns) {
+        const int64_t start = (int64_t)y * columns;
+        hot.enter(start, columns);
+        repaired.enter(start, columns);
+        const uint32_t *numbers =
+            model->noisy ? draw(*model, start, row.numbers.data()) : nullptr;
+        if (model->dim_values) {
+            look_up(*model, start, numbers, hot, repaired, grey, row.computed.data());
+            find_spans(start, y, columns, row.computed.data(), row.spans);
+        } else {
+            row.spans.assign(1, {start, y, 0, columns});
+        }
+        float *charge = row.charge.data();
+        float *signal = model->noisy ? row.signal.data() : charge;
+        for (const Span &span : row.spans) add_charge(*model, span, charge);
+        for (int64_t n = hot.first; n < hot.end; ++n)
+            charge[hot.places[n] - start] += model->hot_charge[n];
+        for (const Span &span : row.spans) {
+            if (model->noisy) add_noise(*model, span, numbers, charge, signal);
+            amplify(*model, span, signal);
+        }
         // Of two neighbours that are repaired, each sees the other one as it was.
         row.means.clear();
-        int64_t mean = repair;
-        for (; mean < model->repairs && model->repaired[mean] < next; ++mean) {
-            const int64_t x = model->repaired[mean] - start;
+        for (int64_t n = repaired.first; n < repaired.end; ++n) {
+            const int64_t x = repaired.places[n] - start;
             row.means.push_back((signal[x - 1] + signal[x + 1]) * 0.5f);
         }
-        for (const float value : row.means) signal[model->repaired[repair++] - start] = value;
-        quantise(*model, signal, grey + (int64_t)(y - first) * columns);
+        for (int64_t n = repaired.first; n < repaired.end; ++n)
+            signal[repaired.places[n] - start] = row.means[n - repaired.first];
+        for (const Span &span : row.spans) quantise(*model, span, signal, grey);
     }
 }

@@ -6,17 +6,32 @@ are equal to the bit, on any rows and with any number of threads.
 """
 
 import ctypes
+import itertools
+import math
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.emulator.light.library import Library, NoiseRecord, address, light_library, noise_of
-from cubestack.emulator.light.noise import FrameNoise
+from cubestack.emulator.light.noise import FrameNoise, normals_of
 
 Light = NDArray[np.float32]
 Grey = NDArray[np.uint8]
 Places = NDArray[np.int64]
+
+TABLE_BITS = 14
+"""Highest bits of a pixel's random number, by which its grey value is found where light is dim."""
+
+DIM = 0.002
+"""Dim light in standard deviations of the noise."""
+
+UNKNOWN = 255
+"""Instead of a grey value that depends on more."""
+
+ROUNDING = 1e-3
+"""Above what rounding and the pieces of the noise's function change, in units of either."""
 
 NOWHERE: Places = np.zeros(0, np.int64)
 NO_CHARGE: Light = np.zeros(0, np.float32)
@@ -97,7 +112,8 @@ class ModelRecord(ctypes.Structure):
         ("repairs", ctypes.c_int64),
         *((name, ctypes.c_int32) for name in ("columns", "noisy", "shot_of_light")),
         *((name, ctypes.c_float) for name in ("dark", "shot", "steady", "black", "offset")),
-        *((name, ctypes.c_float) for name in ("full_scale", "step")),
+        *((name, ctypes.c_float) for name in ("full_scale", "step", "dim")),
+        ("dim_values", ctypes.c_void_p),
         ("noise", NoiseRecord),
     )
 
@@ -108,15 +124,17 @@ def compiled(
     """The same by the compiled library; ``rows``: only from the first up to the second one."""
     first, end = rows or (0, len(light))
     columns = light.shape[1]
+    gains = _gains(model, columns)
     fields = {
         "light": light,
         "response": model.response,
         "dark_share": model.dark_share,
-        "gain": _gains(model, columns),
+        "gain": gains,
         "pattern": model.pattern,
         "hot": model.hot,
         "hot_charge": model.hot_charge,
         "repaired": model.repaired,
+        "dim_values": _dim_values_of(model, gains),
     }
     # Kept until the call has ended.
     kept = {n: None if one is None else np.ascontiguousarray(one) for n, one in fields.items()}
@@ -134,6 +152,7 @@ def compiled(
         offset=model.offset,
         full_scale=model.full_scale,
         step=model.step,
+        dim=_dim_light(model),
         noise=noise_of(model.noise),
     )
     grey = np.empty((end - first, columns), np.uint8)
@@ -146,3 +165,47 @@ def compiled(
 def _gains(model: PixelModel, columns: int) -> Light:
     """The gain of even and of odd rows, (2, columns)."""
     return np.ascontiguousarray(np.broadcast_to(np.asarray(model.gain, np.float32), (2, columns)))
+
+
+def _dim_light(model: PixelModel) -> float:
+    """Light up to which a pixel's grey value is taken from the table; far below its noise."""
+    return DIM * math.sqrt(model.dark * model.shot + model.steady)
+
+
+def _dim_values_of(model: PixelModel, gains: Light) -> Grey | None:
+    """Grey values of ordinary pixels, as of ``_dim_values``; None where they have own fields."""
+    if model.noise is None or not (model.response is model.dark_share is model.pattern is None):
+        return None
+    charge = model.dark, model.dark + _dim_light(model)
+    gain = float(gains.min()), float(gains.max())
+    end = model.offset, model.full_scale, model.step
+    return _dim_values(charge, model.shot, model.steady, model.black, gain, *end)
+
+
+@lru_cache(maxsize=64)
+def _dim_values(
+    charge: tuple[float, float],
+    shot: float,
+    steady: float,
+    black: float,
+    gain: tuple[float, float],
+    offset: float,
+    full_scale: int,
+    step: float,
+) -> Grey:
+    """Grey value by the highest ``TABLE_BITS`` of a pixel's number; UNKNOWN where others matter.
+
+    Those are the number's further bits and, between the two given ones, charge and gain.
+    """
+    first = np.arange(1 << TABLE_BITS, dtype=np.uint32) << np.uint32(32 - TABLE_BITS)
+    last = first | np.uint32((1 << (32 - TABLE_BITS)) - 1)
+    normals = np.sort([normals_of(first), normals_of(last)], axis=0).astype(np.float64)
+    normals += [[-ROUNDING], [ROUNDING]]
+    sigmas = [math.sqrt(one * shot + steady) for one in charge]
+    corners = itertools.product(normals, sigmas, charge, gain)
+    signals = [(normal * sigma + one - black) * more for normal, sigma, one, more in corners]
+    low, high = (
+        np.floor(np.clip(signal + offset + 0.5, 0, full_scale) * step)
+        for signal in (np.min(signals, axis=0) - ROUNDING, np.max(signals, axis=0) + ROUNDING)
+    )
+    return np.where(low == high, low, UNKNOWN).astype(np.uint8)

@@ -168,7 +168,7 @@ class Optics(DeclaredValues):
     def transmission(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
         """Relative light (n,) of directions (n, 3) in camera axes, 1 on the axis."""
         cosine = np.clip(vectors[:, 2], 0, 1)
-        light = np.asarray(cosine**self.vignetting, np.float64)
+        light = cosine**self.vignetting if self.vignetting else np.ones_like(cosine)
         if self.field_stop_deg < 180:
             light[cosine < np.cos(np.radians(self.field_stop_deg / 2))] = 0
         return light

@@ -72,6 +72,67 @@ def test_grey_values_are_equal(seed: int) -> None:
 
 
 @needs_compiler
+@together("step", [1 / 16, 0.25, 1.0])
+@together("gain", [0.3, 1.0, np.array([[1.0, 1.02]])])
+@together("shot_of_light", [False, True])
+@together("steady", [0.3, 20.0])
+def test_grey_values_of_a_dark_sky_are_equal(
+    steady: float, shot_of_light: bool, gain: float | np.ndarray, step: float
+) -> None:
+    rng = np.random.default_rng(round(100 * steady))
+    light = 10 ** rng.uniform(-7, 3, (SHAPE[0], 64)).astype(np.float32)
+    light = np.repeat(light, 16, axis=1)[:, : SHAPE[1]].copy()  # as large as a segment
+    light[rng.random(SHAPE) < 0.3] = 0
+    repaired = SHAPE[1] * rng.choice(SHAPE[0], 100, replace=False) + rng.integers(1, 1000, 100)
+    model = PixelModel(
+        noise=FrameNoise([7]),
+        hot=np.sort(rng.choice(PIXELS, 200)),
+        hot_charge=np.full(200, 50, np.float32),
+        repaired=np.sort(repaired),
+        dark=12.0,
+        black=9.0,
+        shot=0.5,
+        shot_of_light=shot_of_light,
+        steady=steady,
+        gain=np.tile(gain, 502)[:, : SHAPE[1]] if isinstance(gain, np.ndarray) else gain,
+        offset=8.0,
+        full_scale=4095 if step < 0.1 else 1023 if step < 1 else 255,
+        step=step,
+    )
+    expected = pixels.reference(light, model)
+    np.testing.assert_array_equal(pixels.compiled(library.light_library(), light, model), expected)
+
+
+@together("light", [0.0, 1.0])
+@together("dark", [0.0, 10.0, 30.0])
+@together("black", [0.0, 10.0])
+@together("gain", [0.1, 1.0, 2.0])
+def test_grey_values_of_dim_pixels_are_known_from_their_numbers(
+    gain: float, black: float, dark: float, light: float
+) -> None:
+    """Each that is known is right, at both ends of its numbers, and few are unknown."""
+    model = PixelModel(
+        noise=FrameNoise([1]), dark=dark, black=black, gain=gain, steady=4.0, offset=10.0, step=0.25
+    )
+    table = pixels._dim_values_of(model, np.full((2, 4), gain, np.float32))
+    assert table is not None
+    unused = 32 - pixels.TABLE_BITS
+    words = (np.arange(len(table), dtype=np.uint32) << np.uint32(unused)).repeat(2)
+    words[1::2] |= np.uint32((1 << unused) - 1)
+
+    class Words(FrameNoise):
+        def words(self, first: int, count: int) -> np.ndarray:
+            return words[first : first + count]
+
+    given = np.full((1, len(words)), light * pixels._dim_light(model), np.float32)
+    grey = pixels.reference(given, replace(model, noise=Words([1])))[0]
+    found = table.repeat(2)
+    known = found != pixels.UNKNOWN
+    np.testing.assert_array_equal(found[known], grey[known])
+    assert known.mean() > 0.98
+
+
+@needs_compiler
 @pytest.mark.parametrize("rows", [(0, 1), (1, 4), (170, 301)])
 def test_rows_do_not_depend_on_which_others_are_computed(rows: tuple[int, int]) -> None:
     for seed in range(3):
