@@ -121,24 +121,34 @@ struct Places {
     }
 };
 
-// Takes ``grey`` from the table, and tells the segments of the row in which that is not enough: a
-// pixel has more than dim light, is a special one or has a number with several values.
-void look_up(const PixelModel &model, int64_t start, const uint32_t *__restrict numbers,
-             const Places &hot, const Places &repaired, uint8_t *__restrict grey,
-             uint8_t *__restrict computed) {
-    const int columns = model.columns;
-    const float *light = model.light + start;
-    for (int first = 0; first < columns; first += SEGMENT) {
-        const int end = std::min(first + SEGMENT, columns);
-        float brightest = 0.0f;
-        for (int x = first; x < end; ++x) brightest = light[x] > brightest ? light[x] : brightest;
-        uint8_t greatest = 0;
-        for (int x = first; x < end; ++x) {
-            grey[x] = model.dim_values[numbers[x] >> (32 - TABLE_BITS)];
-            greatest = std::max(greatest, grey[x]);
-        }
-        computed[first / SEGMENT] = brightest > model.dim || greatest == UNKNOWN;
+// Highest light of a segment; it is not negative, so its bits are in its order.
+float brightest(const float *light) {
+    int32_t most = 0;
+    for (int x = 0; x < SEGMENT; ++x) {
+        int32_t bits;
+        std::memcpy(&bits, light + x, sizeof bits);
+        most = bits > most ? bits : most;
     }
+    float found;
+    std::memcpy(&found, &most, sizeof found);
+    return found;
+}
+
+// Takes ``grey`` from the table, and tells the segments of the row in which that is not enough: a
+// pixel has more than dim light, or a number with several values.
+void look_up(const PixelModel &model, int64_t start, const uint32_t *__restrict numbers,
+             uint8_t *__restrict grey, uint8_t *__restrict computed) {
+    for (int first = 0; first < model.columns; first += SEGMENT) {
+        uint8_t greatest = 0;
+        for (int x = first; x < first + SEGMENT; ++x)
+            grey[x] = model.dim_values[numbers[x] >> (32 - TABLE_BITS)];
+        for (int x = first; x < first + SEGMENT; ++x) greatest = std::max(greatest, grey[x]);
+        computed[first / SEGMENT] =
+            brightest(model.light + start + first) > model.dim || greatest == UNKNOWN;
+    }
+}
+
+void mark_special(int64_t start, const Places &hot, const Places &repaired, uint8_t *computed) {
     for (int64_t n = hot.first; n < hot.end; ++n) computed[(hot.places[n] - start) / SEGMENT] = 1;
     for (int64_t n = repaired.first; n < repaired.end; ++n)
         for (int side = -1; side <= 1; ++side)
@@ -173,12 +183,13 @@ extern "C" void light_grey_values(const PixelModel *model, int32_t first, int32_
         repaired.enter(start, columns);
         const uint32_t *numbers =
             model->noisy ? draw(*model, start, row.numbers.data()) : nullptr;
-        if (model->dim_values) {
-            look_up(*model, start, numbers, hot, repaired, grey, row.computed.data());
-            find_spans(start, y, columns, row.computed.data(), row.spans);
-        } else {
-            row.spans.assign(1, {start, y, 0, columns});
-        }
+        uint8_t *computed = row.computed.data();
+        if (model->dim_values)
+            look_up(*model, start, numbers, grey, computed);
+        else
+            std::memset(computed, 1, row.computed.size());
+        mark_special(start, hot, repaired, computed);
+        find_spans(start, y, columns, computed, row.spans);
         float *charge = row.charge.data();
         float *signal = model->noisy ? row.signal.data() : charge;
         for (const Span &span : row.spans) add_charge(*model, span, charge);

@@ -21,6 +21,9 @@ Light = NDArray[np.float32]
 Grey = NDArray[np.uint8]
 Places = NDArray[np.int64]
 
+SEGMENT = 16
+"""Pixels of a row that are computed together, or all found in a table."""
+
 TABLE_BITS = 14
 """Highest bits of a pixel's random number, by which its grey value is found where light is dim."""
 
@@ -125,6 +128,7 @@ def compiled(
     first, end = rows or (0, len(light))
     columns = light.shape[1]
     gains = _gains(model, columns)
+    in_segments = model.noise is not None and columns % SEGMENT == 0
     fields = {
         "light": light,
         "response": model.response,
@@ -134,7 +138,7 @@ def compiled(
         "hot": model.hot,
         "hot_charge": model.hot_charge,
         "repaired": model.repaired,
-        "dim_values": _dim_values_of(model, gains),
+        "dim_values": _dim_values_of(model, gains) if in_segments else None,
     }
     # Kept until the call has ended.
     kept = {n: None if one is None else np.ascontiguousarray(one) for n, one in fields.items()}
@@ -174,7 +178,7 @@ def _dim_light(model: PixelModel) -> float:
 
 def _dim_values_of(model: PixelModel, gains: Light) -> Grey | None:
     """Grey values of ordinary pixels, as of ``_dim_values``; None where they have own fields."""
-    if model.noise is None or not (model.response is model.dark_share is model.pattern is None):
+    if not (model.response is model.dark_share is model.pattern is None):
         return None
     charge = model.dark, model.dark + _dim_light(model)
     gain = float(gains.min()), float(gains.max())

@@ -79,14 +79,15 @@ def test_grey_values_are_equal(seed: int) -> None:
 def test_grey_values_of_a_dark_sky_are_equal(
     steady: float, shot_of_light: bool, gain: float | np.ndarray, step: float
 ) -> None:
+    shape = (301, 1008)  # whole segments
     rng = np.random.default_rng(round(100 * steady))
-    light = 10 ** rng.uniform(-7, 3, (SHAPE[0], 64)).astype(np.float32)
-    light = np.repeat(light, 16, axis=1)[:, : SHAPE[1]].copy()  # as large as a segment
-    light[rng.random(SHAPE) < 0.3] = 0
-    repaired = SHAPE[1] * rng.choice(SHAPE[0], 100, replace=False) + rng.integers(1, 1000, 100)
+    light = 10 ** rng.uniform(-7, 3, (shape[0], 64)).astype(np.float32)
+    light = np.repeat(light, 16, axis=1)[:, : shape[1]].copy()  # as large as a segment
+    light[rng.random(shape) < 0.3] = 0
+    repaired = shape[1] * rng.choice(shape[0], 100, replace=False) + rng.integers(1, 1000, 100)
     model = PixelModel(
         noise=FrameNoise([7]),
-        hot=np.sort(rng.choice(PIXELS, 200)),
+        hot=np.sort(rng.choice(shape[0] * shape[1], 200)),
         hot_charge=np.full(200, 50, np.float32),
         repaired=np.sort(repaired),
         dark=12.0,
@@ -94,7 +95,7 @@ def test_grey_values_of_a_dark_sky_are_equal(
         shot=0.5,
         shot_of_light=shot_of_light,
         steady=steady,
-        gain=np.tile(gain, 502)[:, : SHAPE[1]] if isinstance(gain, np.ndarray) else gain,
+        gain=np.tile(gain, 504)[:, : shape[1]] if isinstance(gain, np.ndarray) else gain,
         offset=8.0,
         full_scale=4095 if step < 0.1 else 1023 if step < 1 else 255,
         step=step,
