@@ -4,15 +4,17 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from threading import Event, Thread
 from time import monotonic
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
-from rich import progress as bars
 from rich.console import Console, RenderableType
 from rich.measure import Measurement
 from rich.table import Table
 from rich.text import Text
 
 from cubestack.firmware_model.formats.untrusted import shown_lines
+
+if TYPE_CHECKING:
+    from rich import progress as bars
 
 console = Console()
 _errors = Console(stderr=True)
@@ -27,14 +29,6 @@ _WIDEST = 10_000
 
 EVERY_S = 5.0
 """Time between progress lines when standard error is not a terminal."""
-
-
-class _Rate(bars.ProgressColumn):
-    """How many a second."""
-
-    def render(self, task: bars.Task) -> Text:
-        speed = task.finished_speed or task.speed
-        return Text("" if speed is None else f"{speed:.3g}/s", style="progress.data.speed")
 
 
 def _draws(shown: Console) -> bool:
@@ -102,13 +96,22 @@ def _visible(cell: RenderableType) -> RenderableType:
     return shown_lines(cell) if isinstance(cell, str) else cell
 
 
-def progress_bar() -> bars.Progress:
+def progress_bar() -> "bars.Progress":
     """A progress display on standard error; silent if that is not a terminal."""
+    from rich import progress as bars  # most commands show none, and it is slow to load
+
+    class Rate(bars.ProgressColumn):
+        """How many a second."""
+
+        def render(self, task: bars.Task) -> Text:
+            speed = task.finished_speed or task.speed
+            return Text("" if speed is None else f"{speed:.3g}/s", style="progress.data.speed")
+
     return bars.Progress(
         bars.TextColumn("{task.description}"),
         bars.BarColumn(),
         bars.MofNCompleteColumn(),
-        _Rate(),
+        Rate(),
         bars.TimeElapsedColumn(),
         bars.TimeRemainingColumn(),
         console=_errors,
@@ -163,14 +166,14 @@ def busy(label: str, before: int = 0, *, quiet: bool = False) -> Iterator[Told]:
 
 
 #: The display on the terminal; there is only one.
-_open: list[bars.Progress] = []
+_open: "list[bars.Progress]" = []
 
 #: Printers of progress lines; the last one is active.
 _telling: "list[_Teller]" = []
 
 
 @contextmanager
-def _shown_bar() -> Iterator[bars.Progress]:
+def _shown_bar() -> "Iterator[bars.Progress]":
     if _open:
         yield _open[0]
         return

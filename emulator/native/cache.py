@@ -199,8 +199,11 @@ def make_folder(folder: Path) -> None:
 
 def intact(folder: Path, key: str) -> Path | None:
     """The library with ``key`` in its name whose bytes have the hash in its name."""
-    files = folder.glob(f"{key}-*.so")
-    return next((one for one in files if one.stem == f"{key}-{hash_of(one.read_bytes())}"), None)
+    names: list[str] = []
+    with suppress(OSError):
+        names = os.listdir(folder)
+    files = [folder / one for one in names if one.startswith(f"{key}-")]
+    return next((one for one in files if one.name == f"{key}-{hash_of(one.read_bytes())}.so"), None)
 
 
 def _found(folder: Path, key: str) -> Path | None:

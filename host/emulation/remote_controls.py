@@ -1,6 +1,5 @@
 """Actions on a device that another process emulates, over its control port."""
 
-import http.client
 import json
 import os
 from collections.abc import Mapping
@@ -59,6 +58,8 @@ class ControlClient:
 
     def fetch(self, method: str, path: str, body: object = None) -> bytes:
         """The raw answer; raises as ``ask`` does."""
+        import http.client  # it takes longer to load than this whole package
+
         patient = path.partition("?")[0].endswith(PATIENT)
         timeout_s = None if patient else TIMEOUT_S
         connection = http.client.HTTPConnection(*self._address, timeout=timeout_s)

@@ -1,12 +1,10 @@
 """AraMiS' star tracker as a registered device."""
 
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cubestack.firmware_model.interface.aramis import IMAGE_BYTES, INTERFACE
 from cubestack.firmware_model.interface.cameras.mt9m001 import REGISTERS
-from cubestack.host.conformance import effects
 from cubestack.host.devices.device import ConformanceNotes, Device, Engine, Report
 from cubestack.host.devices.registry import call, get
 
@@ -18,6 +16,7 @@ if TYPE_CHECKING:
     from cubestack.host.clients.aramis.client import Aramis
 
 STUDIES = "cubestack.host.studies.aramis"
+EFFECTS = "cubestack.host.conformance.effects"
 BOARD = "cubestack.emulator.boards.aramis"
 
 POINTING_DEG = (84.0, -1.0, 0.0)  # Orion's belt
@@ -80,9 +79,9 @@ DEVICE: "Device[AramisBoard, Aramis]" = Device(
     image_sensor=REGISTERS,
     conformance=ConformanceNotes(
         effects={
-            "StreamDownImage": partial(effects.check_stream, picture_bytes=IMAGE_BYTES),
-            "WriteCameraRegister": partial(
-                effects.check_camera_register, address=REGISTERS["SHUTTER_WIDTH"].address
+            "StreamDownImage": call(f"{EFFECTS}:check_stream", picture_bytes=IMAGE_BYTES),
+            "WriteCameraRegister": call(
+                f"{EFFECTS}:check_camera_register", address=REGISTERS["SHUTTER_WIDTH"].address
             ),
         },
         ended_by={"StartLoop": "StopLoop"},

@@ -1,6 +1,7 @@
 """CubeSense as a registered device."""
 
 from dataclasses import replace
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from cubestack.firmware_model.interface.cubesense import INTERFACE
@@ -53,10 +54,12 @@ DEVICE: "Device[CubeSenseBoard, CubeSense]" = Device(
     open_board=_open_board,
     load_scene=call("cubestack.emulator.camera.ov7620.scene_file:load_earth_sun_scene"),
     scene_form=call("cubestack.emulator.camera.ov7620.scene_form:earth_sun_form"),
-    default_scene=call(
-        "cubestack.emulator.scene.earth_sun:EarthSunScene.facing",
-        sun_deg=(20.0, 10.0),
-        nadir_deg=(-8.0, 12.0),
+    default_scene=cache(  # so that its light is computed once
+        call(
+            "cubestack.emulator.scene.earth_sun:EarthSunScene.facing",
+            sun_deg=(20.0, 10.0),
+            nadir_deg=(-8.0, 12.0),
+        )
     ),
     default_scene_title="Earth and Sun",
     experiment=get("cubestack.host.experiments.cubesense.measure:EXPERIMENT"),

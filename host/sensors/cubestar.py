@@ -1,6 +1,5 @@
 """CubeStar as a registered device."""
 
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -8,7 +7,6 @@ from cubestack.firmware_model.interface.cameras.mlx75412 import REGISTERS
 from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES, INTERFACE
 from cubestack.firmware_model.interface.cubestar.pins import Layout
 from cubestack.firmware_model.interface.cubestar.switches import DEFAULT_SWITCHES, CubeStarSwitches
-from cubestack.host.conformance import effects
 from cubestack.host.devices.device import BoardOption, ConformanceNotes, Device, Report
 from cubestack.host.devices.own_firmware import FIRMWARE_OPTIONS, OwnFirmware, firmware_option
 from cubestack.host.devices.registry import call, get
@@ -22,6 +20,7 @@ if TYPE_CHECKING:
     from cubestack.host.clients.cubestar.client import CubeStar
 
 STUDIES = "cubestack.host.studies.cubestar"
+EFFECTS = "cubestack.host.conformance.effects"
 
 POINTING_DEG = (84.0, -1.0, 0.0)  # Orion's belt
 MAG_LIMIT = 3.8
@@ -179,11 +178,11 @@ DEVICE: "Device[CubeStarStack, CubeStar]" = Device(
     image_sensor=REGISTERS,
     conformance=ConformanceNotes(
         effects={
-            "StreamDownImage": partial(effects.check_stream, picture_bytes=IMAGE_BYTES),
-            "UploadBlock": effects.check_upload,
-            "TestWDG": effects.check_watchdog,
-            "WriteCameraRegister": partial(
-                effects.check_camera_register,
+            "StreamDownImage": call(f"{EFFECTS}:check_stream", picture_bytes=IMAGE_BYTES),
+            "UploadBlock": call(f"{EFFECTS}:check_upload"),
+            "TestWDG": call(f"{EFFECTS}:check_watchdog"),
+            "WriteCameraRegister": call(
+                f"{EFFECTS}:check_camera_register",
                 address=REGISTERS["EXPOSURE"].address + 1,  # its lower byte
             ),
         },

@@ -17,7 +17,7 @@ CubeSense thesis, sections 3.2 and 6.4.1 and appendix A; OV7620 product specific
 import math
 from collections import OrderedDict
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -98,7 +98,6 @@ class Ov7620(ImageSensor[EarthSunScene, FisheyeCondition]):
         self.active_columns = chip.COLUMNS
         self._sccb = SccbSlave(chip.REGISTERS.i2c_address, self._write)
         self._frames: OrderedDict[int, _Frame] = OrderedDict()
-        self._light: tuple[EarthSunScene, float, int, LensError, float, Light] | None = None
 
     @property
     def lens(self) -> LensError:
@@ -271,19 +270,30 @@ class Ov7620(ImageSensor[EarthSunScene, FisheyeCondition]):
             time_ps = 0  # the same at all times
         # The light already contains the spot of a lens in focus.
         further = math.sqrt(max(self._basics.spot_px**2 - luminance.SPOT_PX**2, 0))
-        key = self.scene, self.condition.bloom_px, time_ps, self.lens, further
-        if self._light is None or self._light[:-1] != key:
-            bloom_px = self.condition.bloom_px
-            light = scene_light(self.scene, self.camera, bloom_px, time_ps, self.lens)
-            if further:
-                light = blur(light, further)
-            self._light = *key, light
-        return self._light[-1]
+        bloom_px = self.condition.bloom_px
+        return _light(self.scene, self.camera, bloom_px, time_ps, self.lens, further)
 
     def _target_lines(self, time_ps: int) -> float:
         """Line times of exposure at gain 1 that result in the target level."""
         mean = float(self._light_at(time_ps).mean())
         return (AUTO_LEVEL - luminance.BLACK) / max(mean, 1e-6)
+
+
+@lru_cache(maxsize=8)
+def _light(
+    scene: EarthSunScene,
+    camera: CameraTarget,
+    bloom_px: float,
+    time_ps: int,
+    lens: LensError,
+    further_px: float,
+) -> Light:
+    """As `scene_light`, with further blur; shared by the frames and the sensors that see it."""
+    light = scene_light(scene, camera, bloom_px, time_ps, lens)
+    if further_px:
+        light = blur(light, further_px)
+    light.flags.writeable = False
+    return light
 
 
 def _gain(value: int) -> float:
