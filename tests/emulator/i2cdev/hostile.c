@@ -20,7 +20,7 @@
 #include <unistd.h>
 
 #define DEVICE "/dev/i2c-7"
-enum { TARGET = 0x1A, SLOW = 20, PAGE = 4096, THREADS = 32 };
+enum { TARGET = 0x1A, SLOW = 20, PAGE = 4096, THREADS = 8 };
 
 static int bus;
 static sigjmp_buf back;

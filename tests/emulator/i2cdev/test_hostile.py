@@ -56,7 +56,7 @@ EXPECTED = {
         signal that ended a program in a call: 9
         a call afterwards: 1
         exit status of a child born under calls: 0
-        calls of other threads: 32
+        calls of other threads: 8
     """,
 }
 """What each mode of the program prints, on both routes."""

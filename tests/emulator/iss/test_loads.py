@@ -33,7 +33,7 @@ CASES = [(name, option) for name in loads.ROUNDS for option in ("-O2", "-Os", "-
 
 
 @pytest.mark.parametrize("waits", [False, True], ids=["plain", "waits"])
-@pytest.mark.parametrize(("name", "option"), quick(CASES, 6))
+@pytest.mark.parametrize(("name", "option"), quick(CASES, 3))
 def test_load_ends_with_the_sum_of_this_machine(
     name: str, option: str, waits: bool, tmp_path: Path
 ) -> None:

@@ -211,23 +211,23 @@ def test_well_behaved_clients_are_served_beside_bad_ones(tmp_path):
                 desk.clients[kind, "unread"].write(question * 100)
                 got[kind] = count + len(desk.clients[kind, "polite"].read_now())
                 desk.clients[kind, "polite"].write(question)
-            if number == 100:
+            if number == 60:
                 tracemalloc.start()
 
-        serve(desk.kernel, [*desk.ports.values(), desk.server], desk.busy, 250, step)
+        serve(desk.kernel, [*desk.ports.values(), desk.server], desk.busy, 130, step)
         grown, peak = tracemalloc.get_traced_memory()
         tracemalloc.stop()
-        assert desk.kernel.now > PS_PER_S // 2
+        assert desk.kernel.now > PS_PER_S // 5
         full = 0.8 * desk.kernel.now / PS_PER_S * 11_520
         assert full > 1000
         for kind in SERIAL:
-            assert len(desk.lines[kind, "polite"].received) >= 240
-            assert got[kind] >= 230
+            assert len(desk.lines[kind, "polite"].received) >= 120
+            assert got[kind] >= 110
             assert len(desk.lines[kind, "flood"].received) > full  # its wire is
             assert desk.lines[kind, "flood"].uart.host_backlog <= MAX_UNSENT
             assert desk.lines[kind, "stopped"].received == HALF_A_FRAME
             assert len(desk.ports[kind, "unread"]._unread) <= MAX_UNREAD
-        assert got["i2c"] > 80 * (i2c_socket.LENGTH.size + 4 + 8)
+        assert got["i2c"] > 40 * (i2c_socket.LENGTH.size + 4 + 8)
         assert desk.server.clients == len(ROLES)
         assert (grown, peak) < (SPARE_BYTES, SPARE_BYTES)
 

@@ -60,7 +60,7 @@ def store_and_read(engine: RtlEngine, joined_at: float) -> tuple[bytes, bytes, b
 
 @pytest.mark.skipif(not have_yosys(), reason="no whole Yosys")
 @pytest.mark.parametrize("skipping", [True, False])
-@pytest.mark.parametrize("name", quick_ones(WORKING, "generated_clock", "negative_edge", "latch"))
+@pytest.mark.parametrize("name", quick_ones(WORKING, "latch"))
 def test_foreign_design_stores_and_reads_like_the_shipped_one(name: str, skipping: bool) -> None:
     shipped = cubestar_wiring(CubeStarTop(COLUMNS, ROWS))
     foreign = shipped.with_design(load_design(WORKING[name], COLUMNS, ROWS))

@@ -19,6 +19,7 @@ from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE
 from cubestack.hdl.cubesense.pair import CubeSensePair
 from cubestack.hdl.cubestar.top import CubeStarTop
+from tests.tiers import quick
 
 from .cameras import ListCamera, plain_camera
 from .commanded import Command, CommandedIcarus, Outcome, run_engine
@@ -47,7 +48,7 @@ def star(folder: Path, top: CubeStarTop, camera: ListCamera) -> Star:
     return Star(wiring, CommandedIcarus(folder, wiring, STROBE_PERIOD), camera)
 
 
-@pytest.mark.parametrize("bank", [0, 1])
+@pytest.mark.parametrize("bank", quick([0, 1], 1))
 def test_icarus_stores_small_frames_enabled_at_any_clock(bank, tmp_path):
     """ENABLE rises in one clock after the other of the first frame and its blanking."""
     top = CubeStarTop(5, 3)

@@ -20,6 +20,7 @@ from cubestack.emulator.rtl.sram import (
     Violation,
     ViolationLog,
 )
+from tests.tiers import quick
 
 T = SramTiming()
 START = 1_000_000
@@ -220,7 +221,7 @@ def random_pins(rng: np.random.Generator, old: SramPins) -> SramPins:
     return SramPins(**levels)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", quick(range(4), 2))
 def test_compiled_memory_model_equals_the_python_model(library, seed):
     rng = np.random.default_rng(seed)
     timing = SramTiming(*(int(limit) for limit in rng.integers(1_000, 20_000, 5)))

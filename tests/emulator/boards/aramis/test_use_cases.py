@@ -7,6 +7,7 @@ from cubestack.emulator.scene.attitude import attitude_error_deg
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.interface import aramis as codes
 from cubestack.firmware_model.interface.aramis import CatalogueState, LatchUpStep, Reason
+from tests.tiers import quick
 
 from .conftest import ORION, Desk
 
@@ -183,7 +184,7 @@ def test_catalogue_is_reloaded_periodically_and_can_be_refreshed(active: Desk) -
     assert active.aramis.measure().valid
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", quick(range(6), 3))
 def test_heavy_radiation_never_yields_a_wrong_attitude(seed: int) -> None:
     """At a rate that breaks words, a measurement is right or says why there is none."""
     desk = Desk(seed=seed)

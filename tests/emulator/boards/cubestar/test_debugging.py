@@ -151,7 +151,7 @@ def traced(image: Image, debug: Any) -> tuple[str, int]:
     history = board.insight.history
     trace = VcdTrace(stream, "star", board.kernel, uarts, board.engine, board.probes, history)
     halts = debug(board) if debug is not None else 0
-    end_ps = 2 * PS_PER_S
+    end_ps = PS_PER_S // 2
     while board.kernel.now < end_ps:
         board.kernel.step()
     trace.close()
@@ -160,7 +160,7 @@ def traced(image: Image, debug: Any) -> tuple[str, int]:
 
 
 def test_trace_is_identical_with_and_without_gdb(image: Image) -> None:
-    """Two seconds: attached and running; and halted at hundreds of breakpoints and watchpoints."""
+    """Attached and running; and halted at hundreds of breakpoints and watchpoints."""
     alone, _ = traced(image, None)
     assert alone.count("\n") > 1000
 
@@ -199,7 +199,7 @@ def test_trace_is_identical_with_and_without_gdb(image: Image) -> None:
         return halts
 
     with_halts, count = traced(image, halting)
-    assert count > 2000
+    assert count > 500
     assert with_halts == alone
 
 

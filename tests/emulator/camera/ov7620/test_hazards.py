@@ -1,4 +1,5 @@
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -47,6 +48,9 @@ def grey(*hazards: SensorHazard, frame: int = 3, **how: object) -> np.ndarray:
     return picture(camera(*hazards, **how), frame).astype(int)  # type: ignore[arg-type]
 
 
+plain = cache(grey)
+
+
 def centroid(image: np.ndarray) -> np.ndarray:
     y, x = np.nonzero(image > 150)
     return np.array([x.mean(), y.mean()])
@@ -63,7 +67,7 @@ def test_worst_strength_is_visible_and_repeatable_in_the_ov7620(name: str) -> No
     worst = hazard.sample(hazard.strength.values[-1], None, np.random.default_rng(1))
     one = grey(worst)
     np.testing.assert_array_equal(one, grey(worst))
-    assert np.mean(one != grey()) > 1e-3
+    assert np.mean(one != plain()) > 1e-3
 
 
 def test_dose_effect_is_at_most_1_count_in_a_short_exposure() -> None:
@@ -130,7 +134,7 @@ def test_residuals_displace_and_can_be_undone() -> None:
     residual = LensResiduals(rms_px=1.0, seed=2)
     crooked = lens_of(CameraTarget.SUN, camera(residual, which=CameraTarget.SUN).lens)
     straight = lens_of(CameraTarget.SUN)
-    y, x = np.mgrid[110:390:10, 230:510:10]
+    y, x = np.mgrid[110:390:30, 230:510:30]
     pixels = np.stack([x.ravel(), y.ravel()], axis=1).astype(float)
     moved = np.array([crooked.project(v) for v in straight.unproject(pixels)]) - pixels
     assert 0.5 < np.sqrt((moved**2).sum(axis=1).mean()) < 1.5

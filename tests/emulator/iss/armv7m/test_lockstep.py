@@ -37,10 +37,12 @@ pytest.importorskip("unicorn", reason="unicorn is not installed")
 import unicorn
 from unicorn import arm_const
 
+from tests.tiers import quick
+
 from .encodings import ENCODINGS
 from .programs import END, RAM, RAM_BYTES, Generator, Slice
 
-INSTRUCTIONS = int(os.environ.get("CUBESTACK_LOCKSTEP", "60000"))
+INSTRUCTIONS = int(os.environ.get("CUBESTACK_LOCKSTEP", "30000"))
 SLICE = 24
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="needs a C++ compiler")
@@ -173,7 +175,7 @@ def _compile(*arguments: str | Path) -> None:
 
 
 @needs_compiler
-@pytest.mark.parametrize(("name", "optimization"), CASES)
+@pytest.mark.parametrize(("name", "optimization"), quick(CASES, 5))
 def test_program_ends_as_on_unicorn(
     name: str, optimization: str, support: Path, tmp_path: Path
 ) -> None:

@@ -56,7 +56,7 @@ ACTIONS = st.one_of(
 )
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(st.lists(ACTIONS, max_size=60))
 def test_counts_like_a_stepped_counter(actions):
     bench = Bench(reference=REFERENCE)

@@ -1,6 +1,7 @@
 import subprocess
 import sys
 from dataclasses import replace
+from functools import cache as cache_of
 from pathlib import Path
 
 import pytest
@@ -27,9 +28,16 @@ def cache(tmp_path, monkeypatch) -> Path:
     # Not by XDG_CACHE_HOME: Yosys would have to fill its own cache anew, which takes seconds.
     folder = tmp_path / "cache"
     monkeypatch.setattr(caches, "cache_folder", lambda: folder)
+    for name, text in TEXTS.items():
+        monkeypatch.setattr(build, name, text)
     return folder
 
 
+#: Yosys writes each text once for all tests.
+TEXTS = {n: cache_of(getattr(build, n)) for n in ("cxxrtl_text", "rtlil_text", "variant_text")}
+
+
+@cache_of
 def wiring() -> Wiring:
     return cubestar_wiring(CubeStarTop(3, 2))
 
@@ -93,6 +101,7 @@ def test_two_processes_can_build_the_same_library_at_once(cache):
     assert not [path for path in cache.iterdir() if path.is_dir()]
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_compiled_engine_is_the_default_and_builds_silently(cache, capfd, recwarn):
     assert isinstance(make_engine(wiring()), CompiledEngine)

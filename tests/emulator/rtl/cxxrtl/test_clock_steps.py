@@ -68,12 +68,7 @@ def test_unknown_statements_fall_back_to_eval(star, found, instead):
     assert "return true; }" in steps(wiring, text.replace(found, instead))
 
 
-def test_compiled_step_tracks_a_selectable_memory():
-    wiring = cubestar_double_wiring(CubeStarDouble(5, 3))
-    # INTO is held, not known: either memory may be the one.
-    assert "return 3u >> memory & 1;" in steps(wiring, variant(wiring))
-
-
+@pytest.mark.slow
 def test_compiled_burst_changes_only_the_memory_of_the_storing_board():
     wiring = cubestar_two_boards_wiring(CubeStarTwoBoards(5, 3))
     text = rtlil_text(wiring.component)
@@ -86,6 +81,8 @@ def test_compiled_burst_changes_only_the_memory_of_the_storing_board():
 def test_unclocked_registers_become_inputs_of_the_compiled_step():
     wiring = cubestar_double_wiring(CubeStarDouble(32, 16))
     text = variant(wiring)
+    # INTO is held, not known: either memory may be the one.
+    assert "return 3u >> memory & 1;" in steps(wiring, text)
     assert {"p_into", "p_bus_2e_latched"} < {*input_names(text)}
     assert not {"p_into", "p_bus_2e_latched"} & {n for n, k in members(text).items() if "wire" in k}
 
@@ -97,6 +94,16 @@ FIRST = WIRING.burst_levels[0]
 @pytest.fixture(scope="module")
 def rtlil() -> str:
     return rtlil_text(WIRING.component)
+
+
+@pytest.fixture(scope="module")
+def design() -> str:
+    return cxxrtl_text(WIRING.component)
+
+
+@pytest.fixture(scope="module")
+def first(rtlil) -> str:
+    return variant_text(rtlil, FIRST)
 
 
 def registers(text: str) -> set[str]:
@@ -111,23 +118,23 @@ def test_compiled_bursts_exist_for_each_store_state():
 @pytest.mark.parametrize(
     "levels", quick(map(pytest.param, WIRING.burst_levels), 1), ids=lambda levels: str(dict(levels))
 )
-def test_burst_variant_keeps_the_writers_and_their_hidden_state(rtlil, levels):
+def test_burst_variant_keeps_the_writers_and_their_hidden_state(rtlil, first, design, levels):
     pins = dict(levels)
     side, domain = ("nadir" if pins["SUNEN"] else "sun"), "pix"
     if pins["SHIFT"]:
         side, domain = ("sun" if pins["RNW"] else "nadir"), "link"
-    left = registers(variant_text(rtlil, levels))
+    left = registers(first if levels == FIRST else variant_text(rtlil, levels))
     writers = {name for name in left if f"_{domain}__" in name}
     assert any(name.startswith(f"p_{side}_") and "counter" in name for name in writers)
     # The first Sun pixel is searched by whoever stores the sun camera's picture.
     if not (pins["RNW"] if pins["SHIFT"] else pins["SUNEN"]):
         assert {f"p_{side}_2e_search_2e_{name}" for name in ("x", "y", "searching")} < left
     assert not any("reader" in name for name in left)
-    assert left < registers(cxxrtl_text(WIRING.component))
+    assert left < registers(design)
 
 
-def test_variant_without_fixed_levels_keeps_every_register(rtlil):
-    assert registers(variant_text(rtlil, ())) == registers(cxxrtl_text(WIRING.component))
+def test_variant_without_fixed_levels_keeps_every_register(rtlil, design):
+    assert registers(variant_text(rtlil, ())) == registers(design)
 
 
 def test_unknown_variant_input_is_named_in_the_error(rtlil):
@@ -137,9 +144,8 @@ def test_unknown_variant_input_is_named_in_the_error(rtlil):
         variant_text(rtlil, [("SUN_Y", 0)])
 
 
-def test_pins_header_detects_the_link_clock_and_copies_state(rtlil):
-    design = cxxrtl_text(WIRING.component)
-    header = pins_header(WIRING, design, [variant_text(rtlil, FIRST)])
+def test_pins_header_detects_the_link_clock_and_copies_state(first, design):
+    header = pins_header(WIRING, design, [first])
     assert "#define VARIANTS VARIANT(0)\n" in header
     whole = re.search(r"derived_edge\(const cxxrtl_design::p_top &top\) \{.*\}", header)
     assert whole[0].count("posedge") == 2

@@ -52,7 +52,7 @@ def test_engine_on_the_gateware_of_a_board_agrees(seed: int) -> None:
     line_ps = int(camera.line_clocks * camera.period)
     engines = [engine_on(DirectChannel(bridge_board(BOARD)), BOARD), make_engine(BOARD)]
     assert_same(engines, lambda engine: engine.attach(camera), "attach")
-    for _ in range(60):
+    for _ in range(30):
         step = random_step(rng, camera, 2 * line_ps)
         assert_same(engines, step, step.__qualname__)
 
@@ -84,7 +84,7 @@ def frame_steps(camera: object, span_ps: int, count: int) -> list[Step]:
         SramTiming(output_enable_ps=20_000),
     ],
 )
-@pytest.mark.parametrize("period", [Fraction(100_000), Fraction(10**12, 9_876_543)])
+@pytest.mark.parametrize("period", quick([Fraction(10**12, 9_876_543), Fraction(100_000)], 1))
 def test_slow_memories_break_the_same_rules(timing: SramTiming, period: Fraction) -> None:
     camera = plain_camera(*SIZE, period=period)
     engines = [direct(BOARD, timing), make_engine(BOARD, "compiled", timing)]

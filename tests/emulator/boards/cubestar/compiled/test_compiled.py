@@ -30,7 +30,7 @@ from cubestack.emulator.iss.insight.symbols import Symbols
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3, load_measurements
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.host.studies.cubestar.costs import generated
-from tests.tiers import quick
+from tests.tiers import quick, quick_ones
 
 from .....firmware_model.cubestar.sky import take
 
@@ -55,7 +55,7 @@ def fast() -> Calls:
 
 
 @needs_compiler
-@pytest.mark.parametrize("level", ["O0", "O2", "Os"])
+@pytest.mark.parametrize("level", quick_ones(["O0", "O2", "Os"], "O2"))
 def test_compiled_attitude_is_identical_to_the_bit(level: str, shot: NDArray[np.uint8]) -> None:
     calls = start_program(image(level), Timing())
     expected = picture.run_model(shot, onboard_catalogue(), Meter(CORTEX_M3))
