@@ -88,7 +88,7 @@ def test_sigmas_hold_with_displaced_stars() -> None:
     hold(*shares(draw))
 
 
-@pytest.mark.parametrize("factor", quick([0.99, 0.999, 1.003, 1.0, 1.02], 2))
+@pytest.mark.parametrize("factor", quick([0.99, 0.999, 1.003, 1.0, 1.02], 1))
 @pytest.mark.parametrize("side", quick([0.3, 0.0], 1))
 def test_robust_fit_estimates_a_focal_length_error_only_if_present(
     factor: float, side: float
@@ -145,7 +145,7 @@ def axis_shares(
 
 
 @pytest.mark.parametrize("noise", quick([3e-5, 1e-3], 1))
-@pytest.mark.parametrize("count", [3, 5, 15])
+@pytest.mark.parametrize("count", quick([3, 5, 15, 9], 2))
 def test_sigmas_hold_per_axis(count: int, noise: float) -> None:
     hold(*axis_shares(count, noise, [count, round(1e6 * noise)]), high=0.78)
 

@@ -4,6 +4,7 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from cubestack.firmware_model.cubesense.download import frame_pixels
 from cubestack.firmware_model.cubesense.vision.edges import EdgeConfig, EdgeList, NadirLines
@@ -27,9 +28,12 @@ def distort(radius: NDArray[np.float64] | float) -> NDArray[np.float64]:
     return np.asarray(np.polyval([-2.5572e-6, 7.6076e-5, 0.9953, 0.1036], radius))
 
 
+_DISTORTED = distort(_DENSE)
+
+
 def undistort(radius: NDArray[np.float64] | float) -> NDArray[np.float64]:
     """Inverse of ``distort``, out of a dense table of it; 0 below its smallest value."""
-    return np.interp(radius, distort(_DENSE), _DENSE)
+    return np.interp(radius, _DISTORTED, _DENSE)
 
 
 def directions(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -66,11 +70,12 @@ def angular_radius_deg(altitude_km: float) -> float:
 
 
 @lru_cache(maxsize=2)
-def _field(boresight: tuple[float, float]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Offsets from the boresight (rows, columns, 2), and unit vectors."""
+def _field(boresight: tuple[float, float]) -> tuple[NDArray[np.float64], ...]:
+    """Offsets from the boresight (rows, columns, 2), their lengths, and unit vectors."""
     rows, columns = np.mgrid[:ROWS, :COLUMNS]
     offsets = np.stack([columns - boresight[0], rows - boresight[1]], axis=-1)
-    return offsets, directions(offsets[..., 0], offsets[..., 1])
+    x, y = offsets[..., 0], offsets[..., 1]
+    return offsets, np.hypot(x, y), directions(x, y)
 
 
 def earth(
@@ -82,20 +87,29 @@ def earth(
     level: float = EARTH_LEVEL,
 ) -> NDArray[np.uint8]:
     """An even Earth; pixels on its limb and on the rim of the field get the share they see."""
-    offsets, vectors = _field(boresight)
+    share = _earth_share(alpha_deg, beta_deg, altitude_km, boresight)
+    return _digital(BACKGROUND + (level - BACKGROUND) * share, rng)
+
+
+@lru_cache(maxsize=32)
+def _earth_share(
+    alpha_deg: float, beta_deg: float, altitude_km: float, boresight: tuple[float, float]
+) -> NDArray[np.float64]:
+    """Of each pixel, the part that the Earth covers."""
+    offsets, radius, vectors = _field(boresight)
     towards = direction(alpha_deg, beta_deg)
     limit = np.cos(np.radians(angular_radius_deg(altitude_km)))
     rim = float(distort(FIELD_DEG * PX_PER_DEG))
-    cosine, radius = vectors @ towards, np.hypot(offsets[..., 0], offsets[..., 1])
-    share = ((cosine >= limit) & (radius <= rim)).astype(float)
-    unsure = (np.abs(cosine - limit) < 0.02) | (np.abs(radius - rim) < 1)
+    inside = (vectors @ towards >= limit) & (radius <= rim)
+    unsure = ndimage.maximum_filter(inside, 3) & ~ndimage.minimum_filter(inside, 3)
     fine = (np.arange(FINE) + 0.5) / FINE - 0.5
     x = offsets[unsure][:, 0, None, None] + fine[None, None, :]
     y = offsets[unsure][:, 1, None, None] + fine[None, :, None]
     x, y = np.broadcast_arrays(x, y)
     seen = (directions(x, y) @ towards >= limit) & (np.hypot(x, y) <= rim)
+    share = inside.astype(float)
     share[unsure] = seen.mean(axis=(1, 2))
-    return _digital(BACKGROUND + (level - BACKGROUND) * share, rng)
+    return share
 
 
 def sun(

@@ -1,6 +1,6 @@
 """Measurements: results, every result code, times, settings, and what is left whole."""
 
-from itertools import groupby
+from itertools import groupby, product
 from typing import Any
 
 import numpy as np
@@ -35,6 +35,7 @@ from cubestack.firmware_model.interface.cubesense.switches import CubeSenseSwitc
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.pic18 import PIC18F45K20
 from cubestack.firmware_model.mcu.requests import ReadTimer, Routine, SetPin, StrobeRead
+from tests.tiers import quick
 
 from .harness import FRAME_US, READ_OUT_US, Harness, stored
 from .scenery import SUN_BORESIGHT, chequered, earth, edges_in, error_deg, place, sun, window
@@ -111,8 +112,7 @@ def test_nadir_is_measured_from_either_memory(
     assert edges_of(unit) == {(x / EDGE_UNIT, y / EDGE_UNIT) for x, y in edges.points}
 
 
-@pytest.mark.parametrize("sram", Sram)
-@pytest.mark.parametrize("profile", PROFILES)
+@pytest.mark.parametrize(("profile", "sram"), quick(product(PROFILES, Sram), 1))
 def test_dynamic_threshold_is_the_mean_of_all_pixels(profile: str, sram: Sram) -> None:
     unit = Harness(CubeSenseSwitches.of(profile, "threshold=dynamic"))
     picture = (34 + (earth(5, -20) - 34.0) / 4).astype(np.uint8)  # all below the fixed one

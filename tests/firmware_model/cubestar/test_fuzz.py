@@ -9,10 +9,10 @@ from tests.tiers import quick
 
 from .harness import Harness
 
-UART_BYTES = 100_000
+UART_BYTES = 40_000
 STREAM = INTERFACE.telecommand("StreamDownImage").id
 
-short_and_long = pytest.mark.parametrize("count", quick([2_000, 10_000], 1))
+short_and_long = pytest.mark.parametrize("count", quick([1_000, 10_000], 1))
 """Of frames, messages or transitions."""
 
 
@@ -118,11 +118,11 @@ def test_random_i2c_transitions_do_not_harm_the_node(lit: Harness, count: int) -
 def test_flood_of_frames_drops_whole_answers_when_the_uart_is_full(lit: Harness) -> None:
     flood = encode_frame(bytes([143])) + encode_frame(b"\x10") + encode_frame(b"\x80")
     answers = 0
-    for _ in range(3000):
+    for _ in range(1500):
         answers += len(lit.uart(flood))  # none of them is cut short
         lit.backlog = min(lit.backlog + 120, 2048)
         lit.run(until_us=lit.now_us + 2_600)
-    assert 3 <= answers < 9000
+    assert 3 <= answers < 4500
     lit.backlog = 0
     assert "UART_TcmdBufOfError" in lit.flags()
     stays_sane(lit)

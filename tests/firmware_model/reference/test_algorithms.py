@@ -121,7 +121,7 @@ def test_c_processing_returns_the_same_bits_from_centroid_to_attitude(
     settings = Settings(INTERFACE, SETTING_COMMANDS)
     config = detection_config(settings, plain_weights=PUBLISHED.weights == "intensity")
     named = 0
-    for _, picture in skies(listed, 30, 1):
+    for _, picture in skies(listed, 10, 1):
         expected = detect_stars(picture, config, METER)
         assert_same_detection(program.detect(picture, config), expected)
         points = geometry.undistort(expected.centroids, camera, METER)
@@ -132,7 +132,7 @@ def test_c_processing_returns_the_same_bits_from_centroid_to_attitude(
         assert_same_identities(program.identify(vectors, None, 0.001), identities)
         solve(program, vectors, identities, listed)
         named += identities.outcome is MatchOutcome.IDENTIFIED
-    assert named > 20
+    assert named > 6
 
 
 @pytest.mark.parametrize("seed", quick(range(12), 4))

@@ -32,6 +32,7 @@ from cubestack.host.studies.aramis.sky import (
     pictures,
 )
 from cubestack.host.studies.aramis.stars_alone import COARSE, outcomes
+from tests.tiers import quick
 from tests.together import together
 
 NOISY = replace(COARSE, noise_px=1.0)
@@ -84,14 +85,17 @@ def test_rough_direction_rules_out_far_results_in_noise() -> None:
 
 @pytest.mark.parametrize(
     ("light", "hint_error_deg", "right", "field"),
-    [
-        (Light(), None, 0.98, FIELD),
-        (Light(false_stars=5), None, 0.98, FIELD),
-        (Light(false_stars=5), 2.0, 0.98, FIELD),
-        (Light(false_stars=5, false_mags=(0, 3)), None, 0.95, FIELD),
-        (Light(mag_limit=5, false_stars=5), None, 0.95, FIELD),
-        (Light(false_stars=5), None, 0.95, CameraField(fov_deg=18)),
-    ],
+    quick(
+        [
+            (Light(false_stars=5), 2.0, 0.98, FIELD),
+            (Light(), None, 0.98, FIELD),
+            (Light(false_stars=5), None, 0.98, FIELD),
+            (Light(false_stars=5, false_mags=(0, 3)), None, 0.95, FIELD),
+            (Light(mag_limit=5, false_stars=5), None, 0.95, FIELD),
+            (Light(false_stars=5), None, 0.95, CameraField(fov_deg=18)),
+        ],
+        2,
+    ),
 )
 def test_verification_accepts_right_solutions(
     light: Light, hint_error_deg: float | None, right: float, field: CameraField
@@ -163,14 +167,14 @@ def test_coinciding_stars_are_refused_as_degenerate(profile: Profile) -> None:
 @PROFILES
 @pytest.mark.parametrize("value", [0.0, np.nan])
 def test_invalid_direction_gives_no_solution(profile: Profile, value: float) -> None:
-    for made in pictures(5, 11):
+    for made in pictures(2, 11):
         solution = run(made, profile, np.full(3, value, dtype=np.float32))
         assert solution.outcome is not MeasurementOutcome.CONCLUSIVE
 
 
 @PROFILES
 def test_hint_in_the_opposite_direction_yields_no_solution(profile: Profile) -> None:
-    for made in pictures(10, 7):
+    for made in pictures(4, 7):
         solution = run(made, profile, -made.boresight.astype(np.float32))
         assert solution.outcome is not MeasurementOutcome.CONCLUSIVE
 
@@ -180,7 +184,7 @@ def test_rejects_attitude_far_from_the_hint() -> None:
     rng = np.random.default_rng(8)
     strict = replace(VERIFIED.profile, hint_tolerance_deg=1.0)
     loose = replace(VERIFIED.profile, hint_tolerance_deg=5.0)
-    for made in pictures(10, 8):
+    for made in pictures(4, 8):
         hint = made.hint(2.0, rng)
         assert run(made, strict, hint).outcome is MeasurementOutcome.NONE
         assert run(made, loose, hint).outcome is MeasurementOutcome.CONCLUSIVE
@@ -203,7 +207,7 @@ def test_identification_phases_add_up_to_the_total() -> None:
     ("smear_px", "skew_px", "smeared"),
     [(9.0, 3.9, True), (9.0, 2.0, False), (12.0, 0.0, True), (3.9, 9.0, False)],
 )
-@pytest.mark.parametrize("many", [True, False])
+@pytest.mark.parametrize("many", quick([True, False], 1))
 def test_smear_is_the_reason_only_where_stars_moved_beyond_the_tolerance(
     smear_px: float, skew_px: float, smeared: bool, many: bool
 ) -> None:

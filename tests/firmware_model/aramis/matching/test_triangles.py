@@ -231,7 +231,7 @@ def scored(light: Array, vectors: Array, known: Array) -> list[int]:
 )
 def test_triangles_and_identities_equal_the_printed_listing(light: Light, aided: bool) -> None:
     onboard = database()
-    for made in pictures(40, 12, light):
+    for made in pictures(15, 12, light):
         hint = made.boresight.astype(np.float32) if aided else None
         faces = np.ones(320, bool) if hint is None else onboard.sphere.around(hint, meter())
         vectors = FIELD.directions(made.stars.centroids, meter())

@@ -49,14 +49,14 @@ def errors(
 
 
 def test_nadir_error_meets_its_goal_for_a_full_earth(ours: NadirConfig) -> None:
-    error = errors(ours, EdgeConfig(), 0, 30, 40)
+    error = errors(ours, EdgeConfig(), 0, 30, 15)
     mean, sigma = np.abs(error).mean(axis=0), error.std(axis=0)
     assert mean.max() < 0.03  # the goal is 0.12
     assert sigma.max() < 0.03  # the goal is 0.18
 
 
 def test_nadir_error_of_a_partial_earth_is_below_0_2_deg(ours: NadirConfig) -> None:
-    assert np.abs(errors(ours, EdgeConfig(), 35, 80, 30)).max() < 0.2
+    assert np.abs(errors(ours, EdgeConfig(), 35, 80, 12)).max() < 0.2
 
 
 @pytest.mark.parametrize("altitude_km", [300, 750, 1500, 4000])

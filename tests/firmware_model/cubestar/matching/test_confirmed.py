@@ -108,7 +108,7 @@ def test_triangles_equal_exhaustive_search(catalogue: StarCatalogue, tracker: Pa
     listed = np.arccos(np.clip(vectors @ vectors.T, -1, 1))
     np.fill_diagonal(listed, 9.0)
     chance = seen = 0.0
-    for _ in range(12):
+    for _ in range(6):
         rays = tracker.false_rays(rng, count)
         apart = np.arccos(np.clip(rays.astype(float) @ rays.T.astype(float), -1, 1))
         wanted = set()

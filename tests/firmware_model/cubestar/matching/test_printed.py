@@ -51,19 +51,19 @@ def algorithm_2(directions: NDArray[Any], catalogue: StarCatalogue) -> dict[int,
     return {i: star for i, star in named.items() if confirmed[i] >= most - 1}
 
 
-@pytest.mark.parametrize(("false_stars", "seen"), quick([(10, 20), (0, 20), (10, 5), (3, 20)], 2))
+@pytest.mark.parametrize(("false_stars", "seen"), quick([(10, 20), (0, 20), (10, 5), (3, 20)], 1))
 def test_matching_agrees_with_the_printed_voting_algorithm(
     catalogue: StarCatalogue, shoot: Shoot, false_stars: int, seen: int
 ) -> None:
     rng = np.random.default_rng(false_stars)
     same = 0
-    for _ in range(25):
+    for _ in range(15):
         directions = rng.permutation(shoot(rng, false_stars=false_stars).directions)[:seen]
         found = identify(directions, catalogue, meter())
         kept = algorithm_2(directions, catalogue)
         assert (found.outcome is MatchOutcome.IDENTIFIED) == (len(kept) >= 3)
         same += {i: int(found.stars[i]) for i in found.matched} == (kept if len(kept) >= 3 else {})
-    assert same >= 24  # an angle at the margin may round either way
+    assert same >= 14  # an angle at the margin may round either way
 
 
 def test_printed_tracking_takes_the_nearest_star(catalogue: StarCatalogue, shoot: Shoot) -> None:
