@@ -4,6 +4,7 @@ Exit status: 0 done, 1 the run failed, 2 the call was wrong, 128 plus the signal
 signal ended it. An error is one line: what, where, and what would be right.
 """
 
+import gc
 import logging
 import signal
 import sys
@@ -116,9 +117,13 @@ def main(
     if arguments is None:
         _end_in_order()
         _write_anywhere()
+        gc.disable()
     given = sys.argv[1:] if arguments is None else arguments
     asked = next((word for word in given if not word.startswith("-")), None)
     args = make_parser(asked or "").parse_args(given)
+    if arguments is None:
+        gc.freeze()  # what was loaded stays: the collector need not look at it, now or later
+        gc.enable()
     try:
         on_start()
         with _loudness(args.verbose, quiet=args.quiet), warnings.catch_warnings():

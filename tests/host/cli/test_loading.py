@@ -61,3 +61,13 @@ def test_parser_declares_when_it_parses_and_fails_alone() -> None:
     assert ended.value.code == 2
     assert parser.all_declared() is parser  # whatever is broken
     assert made == ["all sound"]  # once
+
+
+def test_collector_runs_again_after_loading_and_leaves_out_what_was_loaded() -> None:
+    code = (
+        "import gc, sys\n"
+        "from cubestack.host.cli.main import main\n"
+        "sys.argv[1:] = ['registers', 'cubestar']\n"
+        "assert main() == 0 and gc.isenabled() and gc.get_freeze_count() > 10_000\n"
+    )
+    subprocess.run([sys.executable, "-P", "-c", code], check=True, stdout=subprocess.DEVNULL)
