@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.attitude.quest import AttitudeError
+from cubestack.firmware_model.attitude.vectors import cross
 from cubestack.firmware_model.mcu.costs import Meter
 
 #: Degrees of freedom by which the declared sigmas count: three stars' residuals are 3, ten's 17.
@@ -82,7 +83,7 @@ def information(
 def inverse(matrix: NDArray[np.float32], meter: Meter) -> NDArray[np.float32]:
     """Inverse of a symmetric positive matrix (3, 3) by its cofactors."""
     first, second, third = matrix
-    cofactors = np.stack([np.cross(second, third), np.cross(third, first), np.cross(first, second)])
+    cofactors = np.array([cross(second, third), cross(third, first), cross(first, second)])
     determinant = np.float32(first @ cofactors[0])
     meter.charge(f32_mul=12 + 3 + 6, f32_add=6 + 2, f32_div=1, f32_compare=1, ram_read=12)
     if not determinant > _SMALLEST_DETERMINANT:

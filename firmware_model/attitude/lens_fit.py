@@ -16,6 +16,7 @@ from cubestack.firmware_model.attitude.lens_models import (
 )
 from cubestack.firmware_model.attitude.quest import quest
 from cubestack.firmware_model.attitude.robust_fit import HALF_CHI2, TAILS
+from cubestack.firmware_model.attitude.vectors import cross
 from cubestack.firmware_model.mcu.costs import Meter
 
 Rays = Callable[[Floats], Floats]  #: unit vectors (n, 3) of pixels (n, 2)
@@ -144,7 +145,7 @@ class LensStars:
             / (2 * float(_STEP_PX))
             for step in np.eye(2, dtype=np.float32) * _STEP_PX
         )
-        turns = [np.cross(axis, predicted) for axis in np.eye(3)]
+        turns = [cross(axis, predicted) for axis in np.eye(3)]
         design = [*turns, *(self._fields[..., :1] * across + self._fields[..., 1:] * down)]
         return np.array(design), self.rays(pixels).astype(float) - predicted
 

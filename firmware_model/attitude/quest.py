@@ -110,17 +110,11 @@ def _profile(
     meter: Meter,
 ) -> NDArray[np.float32]:
     """B = sum of w * measured * reference^T, (3, 3), added up star by star."""
-    profile = np.zeros((3, 3), dtype=np.float32)
-    for body, inertial, weight in zip(
-        measured.astype(np.float32),
-        reference.astype(np.float32),
-        weights.astype(np.float32),
-        strict=True,
-    ):
-        profile += np.outer(weight * body, inertial)
+    body = weights.astype(np.float32)[:, None] * measured.astype(np.float32)
+    products = body[:, :, None] * reference.astype(np.float32)[:, None, :]
     count = len(weights)
     meter.charge(f32_mul=12 * count, f32_add=9 * count, ram_read=7 * count, loop=13 * count)
-    return profile
+    return np.asarray(products.sum(axis=0))
 
 
 def _system(
@@ -165,13 +159,13 @@ def _eliminate(
     matrix: NDArray[np.float32], right: NDArray[np.float32], meter: Meter
 ) -> NDArray[np.float32]:
     rows = np.column_stack([matrix, right]).astype(np.float32)
-    for column in range(3):
-        pivot = column + int(np.argmax(np.abs(rows[column:, column])))
-        rows[[column, pivot]] = rows[[pivot, column]]
-        for row in range(column + 1, 3):
-            with np.errstate(divide="ignore", invalid="ignore"):  # singular: checked by the caller
+    with np.errstate(divide="ignore", invalid="ignore"):  # singular: checked by the caller
+        for column in range(3):
+            pivot = column + int(np.argmax(np.abs(rows[column:, column])))
+            rows[[column, pivot]] = rows[[pivot, column]]
+            for row in range(column + 1, 3):
                 factor = rows[row, column] / rows[column, column]
-            rows[row, column:] -= factor * rows[column, column:]
+                rows[row, column:] -= factor * rows[column, column:]
     solution = np.zeros(3, dtype=np.float32)
     for row in (2, 1, 0):
         rest = rows[row, 3]

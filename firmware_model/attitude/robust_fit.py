@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from cubestack.firmware_model.attitude.covariance import covariance, information, inverse
 from cubestack.firmware_model.attitude.geometry import scaled
 from cubestack.firmware_model.attitude.quest import dcm, quest
+from cubestack.firmware_model.attitude.vectors import cross
 from cubestack.firmware_model.mcu.costs import Meter
 
 Floats = NDArray[np.float32]
@@ -119,7 +120,7 @@ class _Stretch:
         x, y, z = stars.T
         away = np.stack([z * z * x, z * z * y, -z * (1 - z * z)], axis=1)
         alone = inverse(information(stars, weights, meter), meter)
-        shared = np.sum(weights[:, None] * np.cross(stars, away), axis=0)
+        shared = np.sum(weights[:, None] * cross(stars, away), axis=0)
         turn = -alone @ shared
         known = np.sum(weights * np.sum(away * away, axis=1)) + shared @ turn
         told = np.sum(weights * np.sum(away * apart, axis=1))

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from cubestack.firmware_model.attitude.geometry import turned
 from cubestack.firmware_model.attitude.quest import AttitudeError
 from cubestack.firmware_model.attitude.robust_fit import robust_fit
+from cubestack.firmware_model.attitude.vectors import cross
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.star_tracker.confirmation import (
     by_chance,
@@ -191,7 +192,7 @@ def _in_time(
     here = now.directions[pairs[:, 1]]
     share = (now.late_s[pairs[:, 1]] - before.late_s[pairs[:, 0]]) / np.float32(apart_s)
     meter.charge(f32_mul=10 * len(pairs), f32_add=7 * len(pairs), f32_div=len(pairs) + 1)
-    return np.asarray(here - np.cross(turned_by, here) * share[:, None], np.float32)
+    return np.asarray(here - cross(turned_by, here) * share[:, None], np.float32)
 
 
 def _vector(turn: Floats) -> Floats:

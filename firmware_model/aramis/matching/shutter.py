@@ -11,6 +11,7 @@ most, so stars that fit badly weigh 1 / (1 + (distance / twice the median)^2).
 import numpy as np
 
 from cubestack.firmware_model.aramis.arrays import Floats
+from cubestack.firmware_model.attitude.vectors import cross
 from cubestack.firmware_model.mcu.costs import Meter
 
 FEWEST = 5  #: stars: ten components across the line of sight for six unknowns
@@ -58,7 +59,7 @@ def at_middle_row(
         meter.charge(f32_div=6 + 2 * count, f32_sqrt=6 + count, f32_compare=count * 4)
     turns = heights[:, None] * found[3:]
     meter.charge(f32_mul=9 * count, f32_add=6 * count, loop=count)
-    straight: Floats = vectors - np.cross(turns, vectors)
+    straight: Floats = vectors - cross(turns, vectors)
     left = apart - design @ found
     spare = np.maximum(2 * weights.sum() - np.float32(3), _ONE)  # its stiffness holds the turn
     variance = np.maximum(weights @ np.sum(left * left, axis=1) / spare, _FLOOR**2)

@@ -31,6 +31,7 @@ from cubestack.firmware_model.aramis.matching.triangles import (
     charge_triangles,
     measure_triangles,
 )
+from cubestack.firmware_model.attitude.vectors import cross
 from cubestack.firmware_model.star_tracker.observation import Observation
 from cubestack.firmware_model.star_tracker.search import SearchPass, Triangles
 
@@ -289,7 +290,7 @@ def _frame(corners: Floats) -> Floats:
     middle = corners.sum(axis=1)
     middle /= np.sqrt((middle * middle).sum(axis=1, keepdims=True))
     edge = 2 * corners[:, 0] - corners[:, 1] - corners[:, 2]
-    normal = np.cross(middle, edge)
+    normal = cross(middle, edge)
     normal /= np.sqrt((normal * normal).sum(axis=1, keepdims=True))
-    axes: Floats = np.stack([middle, normal, np.cross(middle, normal)], axis=1)
+    axes: Floats = np.stack([middle, normal, cross(middle, normal)], axis=1)
     return axes
