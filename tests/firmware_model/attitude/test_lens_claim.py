@@ -24,16 +24,16 @@ def shift(seed: int, px: float) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize("stars", quick([4, 5, 9, 14], 2))
-@pytest.mark.parametrize("percent", [0.5, 2.0, 5.0])
+@pytest.mark.parametrize("percent", quick([2.0, 0.5, 5.0], 1))
 def test_no_shape_of_pixels_is_believed_outside_of_the_claim(stars: int, percent: float) -> None:
     for seed in SKIES:
         verdict, error = judged(seed, stars=stars, linear=shape(seed, percent))
         assert verdict.is_refused or is_within(verdict, error), seed
 
 
-@pytest.mark.parametrize("longer", [1.0, 2.5, NARROW])
+@pytest.mark.parametrize("longer", quick([1.0, 2.5, NARROW, 1.5], 2))
 @pytest.mark.parametrize("stars", quick([4, 5, 9, 14], 2))
-@pytest.mark.parametrize("tolerances", [1.0, 2.0, 4.0])
+@pytest.mark.parametrize("tolerances", quick([4.0, 2.0, 1.0], 1))
 def test_no_principal_point_is_believed_outside_of_the_claim(
     longer: float, stars: int, tolerances: float
 ) -> None:

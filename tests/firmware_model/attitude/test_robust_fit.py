@@ -154,7 +154,7 @@ def test_sigmas_hold_with_uneven_stars() -> None:
     hold(*axis_shares(8, 2e-4, 4, uneven=True), high=0.78)
 
 
-@pytest.mark.parametrize("declared", [0.6, 1.6])
+@pytest.mark.parametrize("declared", quick([0.6, 1.6], 1))
 def test_covariance_adapts_to_residuals_when_sigma_is_misstated(declared: float) -> None:
     hold(*axis_shares(15, 2e-4, 5, declared=declared), low=0.6)
 

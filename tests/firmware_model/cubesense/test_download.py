@@ -24,7 +24,7 @@ def expected(node: Links, sram: codes.Sram, size: codes.ImageSize) -> list[bytes
     return [frame.tobytes() for frame in square.reshape(-1, 128)]
 
 
-@pytest.mark.parametrize("size", quick(codes.ImageSize, 2))
+@pytest.mark.parametrize("size", quick(codes.ImageSize, 1))
 def test_image_download_reads_the_memory_once(node: Links, size: codes.ImageSize) -> None:
     sram = codes.Sram(size % 2)
     node.command("StartImageDownload", Sram=sram, Size=size)

@@ -119,7 +119,7 @@ def stays_sane(unit: Harness) -> None:
     assert unit.bench_sent == EARTH.tobytes()
 
 
-@pytest.mark.parametrize(("seed", "mcu_addressing"), [(0, False), (1, True)])
+@pytest.mark.parametrize(("seed", "mcu_addressing"), quick([(1, True), (0, False)], 1))
 def test_random_bytes_on_every_bus_do_not_harm_the_node(seed: int, mcu_addressing: bool) -> None:
     unit = Harness(mcu_addressing=mcu_addressing)
     rng = np.random.default_rng(seed)

@@ -3,7 +3,7 @@
 import io
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cubestack.firmware_model.formats import byte_names, recording
@@ -31,6 +31,7 @@ SETUPS = st.builds(
 )
 
 
+@settings(max_examples=50)
 @given(st.lists(EVENTS, max_size=8), st.none() | SETUPS)
 def test_recording_events_round_trip(tmp_path_factory, events, setup):
     stream = io.StringIO()

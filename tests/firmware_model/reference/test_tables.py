@@ -54,6 +54,8 @@ def test_reference_tables_have_no_rule_for_unlimited_fields() -> None:
 def test_ordered_fields_have_a_reference_rule_with_size_and_offsets() -> None:
     ordered = 0
     for message in INTERFACE.telecommands:
+        if not message.ordered:
+            continue  # of lists of allowed values, rules take long
         rules = [rule for rule in tables._rules(message, []) if rule.startswith("{RULE_ORDER")]
         for rule, pair in zip(rules, message.ordered, strict=True):
             places = [message.field(name).bit_offset // 8 for name in pair]

@@ -1,5 +1,7 @@
 """The compiled loops equal the Python form, in results and charges."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -17,6 +19,7 @@ from cubestack.firmware_model.aramis.pipeline import (
 from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
 from cubestack.firmware_model.mcu.costs import Meter
 from tests.firmware_model.compiled import assert_equal_forms
+from tests.tiers import quick
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="needs a C++ compiler")
 
@@ -55,8 +58,7 @@ def sky(seed: int, kind: str) -> np.ndarray:
 KINDS = ["stars", "many", "noise", "moon", "saturated", "empty"]
 
 
-@pytest.mark.parametrize("method", SpikeRemoval)
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(("kind", "method"), quick(product(KINDS, SpikeRemoval), 6))
 @settings(max_examples=4)
 @given(seed=SEEDS)
 def test_whole_search_with_one_threshold(seed: int, kind: str, method: SpikeRemoval) -> None:

@@ -229,7 +229,7 @@ def test_mirrored_stars_yield_no_triangles() -> None:
         assert not any(len(step.stars) for step in Search(made).steps(6))
 
 
-@pytest.mark.parametrize("scale", quick([0.97, 0.995, 1.01, 1.03], 2))
+@pytest.mark.parametrize("scale", quick([0.97, 0.995, 1.01, 1.03], 1))
 def test_triangle_search_estimates_the_focal_length_error(scale: float) -> None:
     for made in pictures(5, 3):
         centre = np.array(FIELD.centre, np.float32)

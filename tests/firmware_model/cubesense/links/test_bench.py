@@ -17,6 +17,7 @@ from cubestack.firmware_model.interface.cubesense.codes import (
 )
 from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
 from cubestack.firmware_model.interface.cubesense.service_port import CAPTURES, DOWNLOADS
+from tests.tiers import quick, quick_ones
 
 from ..harness import Harness
 from ..links_harness import BENCH_BYTE_US, Links
@@ -44,7 +45,7 @@ def test_bench_does_not_answer_a_failed_capture(node: Links, outcome: CaptureRes
     assert node.letters(b"a") == b"Y"
 
 
-@pytest.mark.parametrize(("letter", "camera"), [(b"s", Camera.NADIR), (b"w", Camera.SUN)])
+@pytest.mark.parametrize(("letter", "camera"), quick([(b"s", Camera.NADIR), (b"w", Camera.SUN)], 1))
 def test_image_is_sent_at_the_line_rate_with_at_most_two_chunks_waiting(
     node: Links, letter: bytes, camera: Camera
 ) -> None:
@@ -105,7 +106,7 @@ def test_register_stream_waits_for_the_end_of_a_bench_download(node: Links) -> N
     assert len(node.opened) == 2
 
 
-@pytest.mark.parametrize("when", ["before", "meanwhile"])
+@pytest.mark.parametrize("when", quick_ones(["before", "meanwhile"], "meanwhile"))
 def test_bench_download_ends_when_the_memory_loses_its_supply(node: Links, when: str) -> None:
     if when == "before":
         node.off = {Sram.SRAM2}

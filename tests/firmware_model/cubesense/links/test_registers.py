@@ -8,6 +8,7 @@ from cubestack.firmware_model.cubesense.links.registers import READ_AHEAD_BYTES
 from cubestack.firmware_model.interface.codec.register_pointer import FILL
 from cubestack.firmware_model.interface.cubesense import codes
 from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
+from tests.tiers import quick
 
 from ..links_harness import Links
 
@@ -172,7 +173,7 @@ def test_read_without_pointer_returns_fill_bytes(node: Links) -> None:
     assert node.read_register(3) == bytes([FILL] * 3)
 
 
-@pytest.mark.parametrize("sram", codes.Sram)
+@pytest.mark.parametrize("sram", quick(codes.Sram, 1))
 def test_image_register_is_read_in_parts_from_one_memory_read(
     node: Links, sram: codes.Sram
 ) -> None:

@@ -12,6 +12,7 @@ from cubestack.firmware_model.cubesense.vision.edges import MAX_EDGES, EdgeConfi
 from cubestack.firmware_model.interface.cubesense.codes import DetectResult
 from cubestack.firmware_model.interface.cubesense.fpga import READ_OUTS
 from cubestack.firmware_model.mcu.costs import Meter
+from tests.tiers import quick
 
 from ..scenery import chequered, earth, edges_in, error_deg, rough, scan, sun, window
 
@@ -141,7 +142,7 @@ def test_as_printed_gateware_and_program_offsets_cancel(meter: Meter) -> None:
     assert len(places["both-searches"]) > 15
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", quick(range(12), 4))
 def test_nadir_fit_equals_the_printed_listing(
     meter: Meter, published: nadir.NadirConfig, lookup: list[int], seed: int
 ) -> None:

@@ -1,6 +1,7 @@
 """The search above the background: what it finds under hazards, what it says, and what it costs."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -187,6 +188,7 @@ def test_stars_are_found_beside_a_saturated_half_image() -> None:
     assert told(found).saturated == pytest.approx(0.5, abs=0.05)
 
 
+@cache
 def hard_pictures() -> dict[str, Picture]:
     rng = np.random.default_rng(10)
     salt = {f"salt {p}": np.where(rng.random(X.shape) < p, 200, 0) for p in (0.05, 0.2, 0.5)}
