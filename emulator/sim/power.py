@@ -73,7 +73,8 @@ class PowerModel:
         self._integrate()
         if self._states[part] != state:
             self._states[part] = state
-            self._currents.clear()
+            for affected in (None, parts[part].channel):
+                self._currents.pop(affected, None)
         self._compare()
 
     def switch(self, channel: str, on: bool) -> None:
