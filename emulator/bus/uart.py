@@ -144,7 +144,7 @@ class Uart:
             while self._incoming:
                 self._on_wire = 1
                 byte, form = self._incoming[0]
-                if form == self.form and self._sampler.next_ps() is None:
+                if (form is self.form or form == self.form) and self._sampler.next_ps() is None:
                     self._on_wire = count = self._at_once()
                     yield self._env.timeout(count * self.byte_ps)
                     if count == 1:

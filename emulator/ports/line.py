@@ -57,24 +57,20 @@ class HostLine:
                 break
         return arrival
 
-    def arrival_of(
-        self, end: bytes, until_ps: int | None, most: int, silence_ps: int
-    ) -> int | None:
-        """When the block that is arriving has its first ``end``, or its last of ``most`` bytes by
-        ``until_ps``; None without any, where the ends have different formats, or where a byte
-        takes longer than ``silence_ps``. ``end`` has one or two bytes."""
+    def arrival_of(self, end: bytes, most: int, silence_ps: int) -> int | None:
+        """When the block that is arriving has its first ``end``, or its last of ``most`` bytes.
+
+        None without a block, where the ends have different formats, and where a byte takes longer
+        than ``silence_ps``. ``end`` has one or two bytes.
+        """
         if not self._blocks or self._sampler is not None:
             return None
         data, first_ps, byte_ps = self._blocks[0]
-        if data[:1] == end[1:]:  # the byte before may have begun an end
+        if byte_ps > silence_ps or data[:1] == end[1:]:  # the byte before may have begun an end
             return None
-        last = min(len(data), most) - 1 if byte_ps <= silence_ps else -1
-        if until_ps is not None:
-            last = min(last, (until_ps - first_ps) // byte_ps)
-        if last < 0:
-            return None
-        place = data.find(end, 0, last + 1)
-        return first_ps + (last if place < 0 else place + len(end) - 1) * byte_ps
+        place = data.find(end, 0, most)
+        last = min(len(data), most) - 1 if place < 0 else place + len(end) - 1
+        return first_ps + last * byte_ps
 
     def take(self, now_ps: int, max_bytes: int | None = None) -> bytes:
         """Return and remove at most ``max_bytes`` bytes that have arrived by ``now_ps``."""
@@ -111,11 +107,12 @@ class HostLine:
             self.uart.host_form = self.uart.form
 
     def _deliver(self, data: bytes, first_ps: int, byte_ps: int) -> None:
-        if self._sampler is None and self.uart.form != self.uart.host_form:
-            self._sampler = LineSampler(self.uart.host_form)  # the device changed its format
         if self._sampler is None:
-            self._blocks.append((data, first_ps, byte_ps))
-            return
+            ours, form = self.uart.host_form, self.uart.form
+            if form is ours or form == ours:
+                self._blocks.append((data, first_ps, byte_ps))
+                return
+            self._sampler = LineSampler(ours)  # the device changed its format
         for index, byte in enumerate(data):
             self._sampler.put(byte, first_ps + (index - 1) * byte_ps, self.uart.form)
 
@@ -147,19 +144,22 @@ class DirectSerial:
         self._line.uart.host_writes(data)
 
     def read_on(self, end: bytes, max_bytes: int, timeout_s: float) -> bytes:
-        """Read as ``read`` does, and go on to the next ``end`` where nothing happens before.
+        """Read as ``read`` does, and go on to the next ``end`` in what the device is sending.
 
-        Between two bytes of a block that the device sends, a host that only waits for ``end``
-        changes nothing. Up to the next event, or with an observer of steps, each byte counts.
+        Between two of its bytes, a host that only waits for ``end`` does nothing. With an observer
+        of steps, each byte counts all the same.
         """
         if not self._await_byte(timeout_s):
             return b""
-        env = self._env
+        env, arrival = self._env, None
         if not env.watched:
-            silence_ps = int(timeout_s * PS_PER_S)
-            arrival = self._line.arrival_of(end, env.horizon(), max_bytes, silence_ps)
-            if arrival is not None:
+            arrival = self._line.arrival_of(end, max_bytes, int(timeout_s * PS_PER_S))
+        if arrival is not None:
+            env.idle_until = arrival
+            try:
                 env.advance_to(arrival)
+            finally:
+                env.idle_until = 0
         return self._line.take(env.now, max_bytes)
 
     def read(self, max_bytes: int, timeout_s: float) -> bytes:
