@@ -97,14 +97,14 @@ class StarReports:
     def _position(self, star: int) -> Values:
         corrected = ("X_CorrectedCoordinate", "Y_CorrectedCoordinate")
         return {
-            **by_name(("X_Coordinate", "Y_Coordinate"), self._detection.centroids[star]),
-            **by_name(corrected, self._results.points[star]),
+            **by_name(("X_Coordinate", "Y_Coordinate"), self._detection.centroids[star].tolist()),
+            **by_name(corrected, self._results.points[star].tolist()),
             "Size": self._detection.sizes[star],
             "Intensity": self._detection.intensities[star],
         }
 
     def _body_vector(self, star: int) -> Values:
-        return by_name(("VbX", "VbY", "VbZ"), self._results.vectors[star])
+        return by_name(("VbX", "VbY", "VbZ"), self._results.vectors[star].tolist())
 
     def _details(self, star: int) -> Values:
         return {
@@ -141,7 +141,7 @@ class StarReports:
     def _hipparcos(self, star: int) -> Values:
         return {
             "Hipparcos": int(self._processing.known.hip[self._match(star)[0]]),
-            **by_name(("X", "Y"), self._detection.centroids[star]),
+            **by_name(("X", "Y"), self._detection.centroids[star].tolist()),
         }
 
     def _match_summary(self) -> Values:

@@ -168,7 +168,8 @@ def count_wrong(hipparcos: Sequence[int], directions: ArrayLike, truth: NDArray[
     if not hipparcos:
         return 0
     sky = load_sky()
-    expected = sky.vectors[np.searchsorted(sky.hip, hipparcos)] @ matrix_from_quaternion(truth).T
+    numbers = np.array(hipparcos, sky.hip.dtype)  # another type would convert the whole catalogue
+    expected = sky.vectors[sky.hip.searchsorted(numbers)] @ matrix_from_quaternion(truth).T
     measured = np.asarray(directions, np.float64)
     cosines = np.sum(expected * measured, axis=1) / np.linalg.norm(measured, axis=1)
     return int(np.sum(np.degrees(np.arccos(np.clip(cosines, -1, 1))) > SAME_STAR_DEG))

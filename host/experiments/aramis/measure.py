@@ -285,7 +285,7 @@ def _is_far(
     named: Sequence[Star], field_deg: float, truth: NDArray[np.float64] | None
 ) -> bool | None:
     """Appendix E's criterion of a wrong result; None if it cannot be evaluated."""
-    triangle = [star.hipparcos or 0 for star in named[:3]]
+    triangle = np.array([star.hipparcos or 0 for star in named[:3]], np.int32)
     if truth is None or len(triangle) < 3:
         return None
     sky = load_sky()
