@@ -32,7 +32,7 @@ from cubestack.host.transport.streams import open_transport
 from tests.system.conftest import Served
 
 LONG = "CUBESTACK_BAD_CLIENTS_S" in os.environ
-LENGTH_S = float(os.environ.get("CUBESTACK_BAD_CLIENTS_S", "1.5"))
+LENGTH_S = float(os.environ.get("CUBESTACK_BAD_CLIENTS_S", "0.9"))
 BUS = 16 + os.getpid() % 200
 BAD_CLIENT = (sys.executable, "-I", "-S", str(Path(__file__).with_name("bad_client.py")))
 SLOWEST_ANSWER_S = 5.0  # on a machine with work of its own

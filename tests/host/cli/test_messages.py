@@ -84,8 +84,8 @@ def test_commands_run_in_an_ascii_locale(command: str) -> None:
     ("words", "file"),
     quick(
         [
-            (["emulated:cubestar", "--scene", "/none.toml"], "/none.toml"),
             (["/dev/nothing", "--device", "cubestar"], "/dev/nothing"),
+            (["emulated:cubestar", "--scene", "/none.toml"], "/none.toml"),
         ],
         1,
     ),

@@ -2,7 +2,7 @@ import re
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cubestack.firmware_model.interface.codec.field import InterfaceError
@@ -30,6 +30,7 @@ def client(uart: Any) -> NodeClient:
 @pytest.mark.parametrize(
     "message", [m for m in INTERFACE.telemetries if m.supported], ids=lambda m: m.name
 )
+@settings(max_examples=20)
 @given(data=st.data())
 def test_every_telemetry_frame_arrives(message: Message, data: st.DataObject) -> None:
     raw = data.draw(st.binary(min_size=message.length, max_size=message.length))

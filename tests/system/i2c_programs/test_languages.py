@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from cubestack.emulator.i2cdev.preload.shim import find_c_compiler
+from tests.tiers import quick
 
 from ...conftest import Run
 from .conftest import TIMEOUT_S, needs_c
@@ -61,7 +62,7 @@ def test_cube_smbus_finds_the_bus_of_its_environment(run: Run, served: Path) -> 
 
 
 @needs_c
-@pytest.mark.parametrize("link", ["-static", "-dynamic"])
+@pytest.mark.parametrize("link", quick(["-static", "-dynamic"], 1))
 def test_c_program_reads_the_emulated_i2c_bus(
     run: Run, route: str, tmp_path: Path, link: str
 ) -> None:
