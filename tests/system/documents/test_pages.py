@@ -225,11 +225,11 @@ def test_commands_and_files_of_the_fidelity_pages_exist(
     commands = re.findall(rf"`measure (?:{device} )?(--[^`]+)`", page)
     assert len(commands) >= measured
     for command in commands:
-        make_parser().parse_args(["measure", device, "--json", *command.split()])
+        make_parser("measure").parse_args(["measure", device, "--json", *command.split()])
     commands = re.findall(r"`\.venv/bin/cubestack ((?!measure)\w[^`]*)`", page)
     assert len(commands) >= others
     for command in commands:
-        make_parser().parse_args(command.split())
+        make_parser(command.split()[0]).parse_args(command.split())
     files = re.findall(r"`(\w+/[\w/]+\.py)`", page)
     files += [
         f"{module.replace('.', '/')}.py" for module in re.findall(r"`python -m ([\w.]+)", page)
