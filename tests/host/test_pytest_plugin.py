@@ -1,7 +1,6 @@
 import re
 import subprocess
 import sys
-from collections.abc import Callable
 from importlib.metadata import entry_points
 from pathlib import Path
 
@@ -12,29 +11,25 @@ from cubestack.firmware_model.interface.codec.switches import DEFAULT_PROFILE
 from cubestack.hdl.flow.tools import have_yosys
 from cubestack.host.devices.registry import emulated_names
 from cubestack.host.pytest_plugin import KEYS
+from tests.conftest import Outcome, Run
+from tests.forked import forked, of_pytest
 
 PLUGIN = "cubestack.host.pytest_plugin"
-Run = Callable[..., "subprocess.CompletedProcess[str]"]
 
+# An installation older than the entry point needs the plugin by name.
+INSTALLED = any(entry.value == PLUGIN for entry in entry_points(group="pytest11"))
+NAMED = () if INSTALLED else ("-p", PLUGIN)
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
 
 
 @pytest.fixture
 def run(tmp_path: Path) -> Run:
     """Runs pytest on the text of a test file."""
-    # An installation older than the entry point needs the plugin by name.
-    installed = any(entry.value == PLUGIN for entry in entry_points(group="pytest11"))
 
-    def run(text: str, *options: str) -> "subprocess.CompletedProcess[str]":
+    def run(text: str, *options: str) -> Outcome:
         (tmp_path / "test_it.py").write_text("import pytest\n" + text)
-        plugin = [] if installed else ["-p", PLUGIN]
-        return subprocess.run(
-            [sys.executable, "-m", "pytest", "-q", "--strict-markers", *plugin, *options],
-            cwd=tmp_path,
-            capture_output=True,
-            text=True,
-            timeout=120,
-        )
+        words = ("-q", "--strict-markers", *NAMED, *options)
+        return forked(of_pytest(*words), folder=tmp_path)
 
     return run
 
@@ -51,10 +46,10 @@ def test_failed_test_reports_the_fault_log(run: Run, tmp_path: Path) -> None:
         f"    assert cubestar.chosen == aramis.chosen == {{'profile': '{DEFAULT_PROFILE}'}}\n",
         "--junitxml=report.xml",
     )
-    assert done.returncode == 1
-    assert "1 failed, 1 passed" in done.stdout
-    assert "assert (3, 2) == (0, 0)" in done.stdout
-    assert "virtual time 0.010000000 s, seed 3\n0.000000000 s latch-up memory: 300" in done.stdout
+    assert done.code == 1
+    assert "1 failed, 1 passed" in done.out
+    assert "assert (3, 2) == (0, 0)" in done.out
+    assert "virtual time 0.010000000 s, seed 3\n0.000000000 s latch-up memory: 300" in done.out
     report = (tmp_path / "report.xml").read_text()
     assert 'name="cubestack.cubestar.virtual_time_s" value="0.010000000"' in report
     assert 'name="cubestack.cubestar.fault_events" value="1"' in report
@@ -88,9 +83,9 @@ def test_seed_and_profile_come_from_marker_or_command_line(run: Run) -> None:
         for number, marker in enumerate(WRONG_MARKERS)
     )
     done = run(text, "--cubestack-seed=8", "--cubestack-profile=extended")
-    assert done.returncode == 1
-    assert f"2 passed, {len(WRONG_MARKERS)} errors" in done.stdout
-    told = re.findall(r"^E  +(.*)", done.stdout, re.MULTILINE)
+    assert done.code == 1
+    assert f"2 passed, {len(WRONG_MARKERS)} errors" in done.out
+    told = re.findall(r"^E  +(.*)", done.out, re.MULTILINE)
     for line, message in zip(told, WRONG_MARKERS.values(), strict=True):
         assert message in line
 
@@ -105,23 +100,25 @@ def test_fixture_runs_own_gateware(run: Run) -> None:
         "    assert cubestar.board.engine.wiring.foreign\n"
         "    assert cubestar.client.capture_and_process().name == 'CALCULATED'\n"
     )
-    assert done.returncode == 0, done.stdout
+    assert done.code == 0, done.out
 
 
 def test_every_registered_device_has_a_fixture(run: Run) -> None:
     done = run("", "--fixtures", "-v")
     for name in emulated_names():
-        assert f"\n{name} -- " in done.stdout
+        assert f"\n{name} -- " in done.out
 
 
-def test_plugin_imports_nothing_heavy(run: Run) -> None:
-    text = (
+def test_plugin_imports_nothing_heavy(tmp_path: Path) -> None:
+    (tmp_path / "test_it.py").write_text(
         "import sys\n"
         "def test_it():\n"
         "    heavy = {'numpy', 'amaranth', 'simpy', 'cubestack.emulator'}\n"
         "    assert not heavy & set(sys.modules)\n"
     )
-    assert run(text, "-p", "no:hypothesispytest", "-p", "no:cacheprovider").returncode == 0
+    plugins = (*NAMED, "-p", "no:hypothesispytest", "-p", "no:cacheprovider")
+    done = subprocess.run([sys.executable, "-m", "pytest", "-q", *plugins], cwd=tmp_path)
+    assert done.returncode == 0
 
 
 def test_entry_point_names_the_plugin() -> None:
@@ -144,9 +141,9 @@ def test_sleeping_driver_runs_in_virtual_time(run: Run, tmp_path: Path) -> None:
     )
     test = "    assert driver.measure(cubestar.serial()) == pytest.approx(0.1, abs=0.001)\n"
     done = run(f"import driver, time\ndef test_it(cubestar):\n{test}    time.sleep(3000)\n")
-    assert done.returncode == 0, done.stdout
+    assert done.code == 0, done.out
     done = run(
         "import time\nSLEEP = time.sleep\n@pytest.mark.cubestack(wall_time=True)\n"
         "def test_it(cubestar):\n    assert time.sleep is SLEEP\n"
     )
-    assert done.returncode == 0, done.stdout
+    assert done.code == 0, done.out

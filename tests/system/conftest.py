@@ -6,15 +6,13 @@ skipped, because full-size pictures take minutes in the reference simulator.
 
 import io
 import json
-import os
 import subprocess
 import sys
-import threading
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, redirect_stderr, redirect_stdout
 from functools import partial
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,10 +22,10 @@ from cubestack.emulator.i2cdev.preload.shim import find_c_compiler
 from cubestack.emulator.native.compiler import find_compiler
 from cubestack.host.cli.main import main
 from cubestack.host.emulation.emulated import AnyEmulated, open_device
+from tests.forked import Served
 
 ROOT = Path(__file__).parents[2]
 COMMAND = (sys.executable, "-m", "cubestack.host.cli.main")
-START_TIMEOUT_S = 120
 
 Frames = list[dict[str, Any]]
 Measure = Callable[..., Frames]
@@ -87,47 +85,6 @@ def emulate(device_name: str, tmp_path: Path) -> Emulate:
             yield served
 
     return run
-
-
-class Served:
-    """A process of `cubestack emulate`, as a context manager; ``said`` is its output so far."""
-
-    def __init__(self, arguments: list[str], folder: Path, *, last: str = " serves on ") -> None:
-        """Starts it in ``folder`` and waits until it prints ``last``."""
-        self.process = subprocess.Popen(
-            [*COMMAND, "emulate", *arguments],
-            cwd=folder,
-            stderr=subprocess.PIPE,
-            text=True,
-            env=os.environ | {"COLUMNS": "200"},  # its message on one line
-        )
-        assert self.process.stderr is not None
-        self.said = ""
-        self._rest = threading.Thread(target=self.process.stderr.read)
-        watch = threading.Timer(START_TIMEOUT_S, self.process.kill)
-        watch.start()
-        for line in self.process.stderr:
-            self.said += line
-            if last in line:
-                break
-        watch.cancel()
-        self._rest.start()
-        if last not in self.said:
-            self.__exit__()
-        assert last in self.said, self.said
-
-    @property
-    def port(self) -> str:
-        return self.said.split(" serves on ")[1].split()[0]
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.process.terminate()
-        self._rest.join()
-        with self.process:
-            self.process.wait(START_TIMEOUT_S)
 
 
 class Ear:

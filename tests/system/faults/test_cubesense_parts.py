@@ -11,7 +11,7 @@ from tests.system.cubesense.conftest import check_right
 
 from .bench import Sense, line_s
 
-X, Y = 320, 300
+X, Y = 320, 20
 ADDRESS = 1024 * Y + X
 
 UNTOUCHED = 1  # a value that no pixel of the scene has

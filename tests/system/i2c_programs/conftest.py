@@ -2,7 +2,6 @@
 
 import os
 import shutil
-import subprocess
 import sys
 import threading
 from collections.abc import Iterator
@@ -17,6 +16,7 @@ from cubestack.emulator.i2cdev.scheduler import open_scheduler
 from cubestack.emulator.i2cdev.server import I2cServer
 from cubestack.host.emulation.emulated import open_device
 from tests.conftest import Outcome, Run
+from tests.forked import command, forked
 from tests.tiers import quick
 
 COMMAND = (sys.executable, "-m", "cubestack.host.cli.main", "run")
@@ -94,13 +94,5 @@ def run(route: str, served: Path) -> Run:
     return call
 
 
-def start(*arguments: object, given: str | None = None) -> Outcome:
-    done = subprocess.run(
-        [*COMMAND, *map(str, arguments)],
-        capture_output=True,
-        input=given,
-        text=True,
-        env=ENVIRONMENT,
-        timeout=TIMEOUT_S,
-    )
-    return Outcome(done.returncode, done.stdout, done.stderr)
+def start(*arguments: object, given: str = "") -> Outcome:
+    return forked(command("run", *arguments), given=given, environment=ENVIRONMENT)
