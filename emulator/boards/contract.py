@@ -11,9 +11,7 @@ from numpy.typing import NDArray
 
 from cubestack.emulator.bus.i2c import Forwarder, I2cBus, I2cTarget
 from cubestack.emulator.bus.uart import Uart
-from cubestack.emulator.faults.injector import Faults
 from cubestack.emulator.faults.sites import Sites
-from cubestack.emulator.i2cdev.direct import DirectI2c
 from cubestack.emulator.ports.line import DirectSerial
 from cubestack.emulator.sim.fpga_port import Microcontroller
 from cubestack.emulator.sim.power import PowerModel, PowerTable
@@ -23,6 +21,8 @@ from cubestack.emulator.sim.virtual_time import Kernel
 if TYPE_CHECKING:
     from cubestack.emulator.boards.firmware import Insight
     from cubestack.emulator.boards.pins import Pins
+    from cubestack.emulator.faults.injector import Faults
+    from cubestack.emulator.i2cdev.direct import DirectI2c
     from cubestack.emulator.rtl.contract import RtlEngine
     from cubestack.emulator.rtl.wiring import Wiring
 
@@ -163,15 +163,19 @@ class Board(ABC):
         return self.lines[0].uart
 
     @cached_property
-    def faults(self) -> Faults:
+    def faults(self) -> "Faults":
+        from cubestack.emulator.faults.injector import Faults
+
         return Faults(self.sites(), self.seed)
 
     def serial(self, name: str = "") -> DirectSerial:
         """A host's end of a serial line, by default the first; KeyError for an unknown name."""
         return DirectSerial(self.kernel, self.uarts[name] if name else self.uart)
 
-    def i2c(self) -> DirectI2c:
+    def i2c(self) -> "DirectI2c":
         """A host's end of the I2C bus in this process."""
+        from cubestack.emulator.i2cdev.direct import DirectI2c
+
         return DirectI2c(self.kernel, self.i2c_bus)
 
     @property

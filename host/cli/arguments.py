@@ -58,6 +58,7 @@ class Parser(argparse.ArgumentParser):
         super().__init__(formatter_class=_Formatter, **options)
         self.set_defaults(own_parser=self)
         self._declare = declare
+        self._given: list[str] = []
         self.failed = ""
 
     def declared(self) -> None:
@@ -68,6 +69,11 @@ class Parser(argparse.ArgumentParser):
                 declare(self)
             except TargetError as error:
                 self.failed = str(error)
+
+    def needed(self, names: Iterable[str]) -> list[str]:
+        """Those of ``names`` that the call contains; all if it contains none."""
+        known = list(names)
+        return [name for name in known if name in self._given] or known
 
     def all_declared(self) -> "Parser":
         """This parser with all arguments of all its commands."""
@@ -81,12 +87,13 @@ class Parser(argparse.ArgumentParser):
     def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
         """The arguments; unknown ones are an error of the command that they belong to.
 
-        ``others``, a default of that command, has flags of other devices with these devices' names.
+        ``others``, a default of that command, returns flags of other devices with these devices'
+        names.
         """
         parsed, unknown = self.parse_known_args(args, namespace)
         if unknown:
             command, flag = parsed.own_parser, unknown[0].partition("=")[0]
-            if owners := getattr(parsed, "others", {}).get(flag):
+            if owners := getattr(parsed, "others", dict)().get(flag):
                 command.error(f"{flag} is an option of {', '.join(owners)}, not of this device")
             command.unknown(unknown)
         parsed.own_parser._check_outputs(parsed)

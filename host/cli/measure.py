@@ -68,7 +68,7 @@ def add_devices(
     ``further`` declares more options of each.
     """
     commands = parser.add_subparsers(dest="device", required=True, metavar="device")
-    for name in device_names():
+    for name in parser.needed(device_names()):
         try:
             device = registered(name)
         except TargetError as error:  # must not keep the others from being measured
@@ -91,7 +91,7 @@ def _declare(
     add_options(command, experiment.options)
     add_board(command, (device, experiment))
     further(command)
-    command.set_defaults(chosen=(device, experiment), others=options_of_others(device))
+    command.set_defaults(chosen=(device, experiment), others=partial(options_of_others, device))
 
 
 def add_board(parser: argparse.ArgumentParser, *measured: tuple[AnyDevice, AnyExperiment]) -> None:

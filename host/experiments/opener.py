@@ -3,14 +3,16 @@
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Generic
+from typing import TYPE_CHECKING, Any, Generic
 
-from cubestack.emulator.faults.plan import Plan, load_plan
 from cubestack.firmware_model.interface.codec.switches import DEFAULT_PROFILE, Switches
 from cubestack.firmware_model.values import whole
 from cubestack.host.devices.device import BoardT_co, ClientT_co, Device, Engine, Shown
 from cubestack.host.emulation.emulated import EmulatedDevice, power_up
 from cubestack.host.options import Options, file_option
+
+if TYPE_CHECKING:
+    from cubestack.emulator.faults.plan import Plan
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,7 +22,7 @@ class MeasureOptions(Options):
     scene: Any = file_option(None, "TOML scene; default: a random one")
     frames: int = whole(1, "number of frames (default 1)", 1)
     seed: int = whole(0, "seed of everything random (default 0)", 0)
-    faults: Path | Plan | None = file_option(None, "TOML fault plan (docs/how-to/faults.md)")
+    faults: "Path | Plan | None" = file_option(None, "TOML fault plan (docs/how-to/faults.md)")
 
 
 def _silent(items: Iterable[Any], _total: int, _label: str) -> Iterator[Any]:
@@ -50,20 +52,23 @@ class Opener(Generic[BoardT_co, ClientT_co]):
         return not self.board.get("firmware") and self.switches.profile != DEFAULT_PROFILE
 
     def __call__(
-        self, scene: Any, *, seed: int, faults: Path | Plan | None = None, **options: Any
+        self, scene: Any, *, seed: int, faults: "Path | Plan | None" = None, **options: Any
     ) -> EmulatedDevice[BoardT_co, ClientT_co]:
         """The device, with its scene and a fault plan (or its file) injected.
 
         ``options`` are board keywords that the experiment sets. Raises ValueError for an invalid
         scene or plan.
         """
-        plan = load_plan(faults) if isinstance(faults, Path) else faults
+        if isinstance(faults, Path):
+            from cubestack.emulator.faults.plan import load_plan
+
+            faults = load_plan(faults)
         emulated = power_up(
             self.device, scene, seed=seed, engine=self.engine, **{**self.board, **options}
         )
-        if plan is not None:
+        if faults is not None:
             try:
-                emulated.faults.load(plan)
+                emulated.faults.load(faults)
             except ValueError:
                 emulated.close()
                 raise

@@ -21,7 +21,6 @@ from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.common.view import SkyView
 from cubestack.emulator.camera.mt9m001.imager import NoiseTerms
 from cubestack.emulator.camera.mt9m001.sensor import Mt9m001
-from cubestack.emulator.faults.parts import flip_bits
 from cubestack.emulator.faults.sites import Sites
 from cubestack.emulator.scene.sky import Scene
 from cubestack.emulator.sim.firmware_loops import offer_firmware_loops
@@ -177,6 +176,8 @@ class AramisBoard(Board):
 
         Returns their number; ValueError for a rate outside 0..1.
         """
+        from cubestack.emulator.faults.parts import flip_bits
+
         target = self.catalogue_flash if memory == "flash" else self.sdram
         return flip_bits(target, rate, self.rng)
 

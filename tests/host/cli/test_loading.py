@@ -22,6 +22,7 @@ def test_help_of_one_device_loads_no_other_one() -> None:
     call = "from cubestack.host.cli.main import main\nmain(['measure', 'aramis', '--help'])"
     found = loaded(call)
     assert "cubestack.host.experiments.aramis.measure" in found
+    assert not {"cubestack.host.sensors.cubestar", "cubestack.emulator.faults.table"} & found
     assert (
         not {f"cubestack.host.experiments.{name}.measure" for name in ("cubestar", "cubesense")}
         & found
