@@ -18,8 +18,8 @@ STEPS = 20
 FOUND = 1e-14
 """Last step of a search, in normalised coordinates."""
 
-FEW = 256
-"""Points that take NumPy no longer than a call of the library, which is not loaded for them."""
+FEW = 50
+"""Fewer points, as a check of a lens has, are left to NumPy, so that the library is not loaded."""
 
 
 @dataclass(frozen=True)

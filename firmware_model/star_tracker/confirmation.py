@@ -173,11 +173,11 @@ def from_three(measured: Floats, reference: Floats, meter: Meter) -> Floats:
     return (there.T @ here).astype(np.float32)
 
 
-def volume(vectors: Floats) -> float:
-    """Six times the volume spanned by three vectors (3, 3), signed by their orientation; not
-    charged."""
-    (a, b, c), (d, e, f), (g, h, i) = vectors.tolist()
-    return float(a * (e * i - f * h) + b * (f * g - d * i) + c * (d * h - e * g))
+def volumes(triples: Floats) -> NDArray[np.float64]:
+    """Six times the volumes (n,) spanned by three vectors each (n, 3, 3), signed by their
+    orientation; not charged."""
+    (a, b, c), (d, e, f), (g, h, i) = triples.astype(np.float64).transpose(1, 2, 0)
+    return np.asarray(a * (e * i - f * h) + b * (f * g - d * i) + c * (d * h - e * g))
 
 
 def _axes(one: list[float], other: list[float]) -> NDArray[np.float64]:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.attitude.geometry import scaled
-from cubestack.firmware_model.star_tracker.confirmation import from_three, volume
+from cubestack.firmware_model.star_tracker.confirmation import from_three, volumes
 from cubestack.firmware_model.star_tracker.observation import Candidate, Observation
 
 Indices = NDArray[np.intp]
@@ -114,20 +114,20 @@ class AttitudeSearch:
         """Attitudes of triangles, except of those in ``seen``: the star of each centroid, by the
         attitudes tried so far."""
         meter = observation.meter
-        for row, (centroids, stars) in enumerate(zip(step.centroids, step.stars, strict=True)):
+        measured = observation.directions.take(step.centroids, axis=0)
+        known = observation.stars.vectors.take(step.stars, axis=0)
+        turned_alike = (volumes(measured) < 0) == (volumes(known) < 0)
+        for row in np.flatnonzero(turned_alike):
             if self._late(observation):
                 return
-            here = observation.directions.take(centroids, axis=0)
-            there = observation.stars.vectors.take(stars, axis=0)
-            if (volume(here) < 0) != (volume(there) < 0):  # it turns the other way
-                continue
+            centroids, stars = step.centroids[row], step.stars[row]
             named = dict(zip(centroids.tolist(), stars.tolist(), strict=True))
             if any(named.items() <= one.items() for one in seen):
                 continue
             tries, factor = self.chance * float(step.shares[row]), float(step.factors[row])
             self.tried += 1
             with meter.phase("verification"):
-                rotation = from_three(scaled(here, factor, meter), there, meter)
+                rotation = from_three(scaled(measured[row], factor, meter), known[row], meter)
                 candidate = observation.confirm(
                     rotation, STARS_OF_TRIANGLE, tries, factor=factor, largest=self.largest
                 )

@@ -13,7 +13,7 @@ from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.cubestar.matching.confirmed import PairPass, identify
 from cubestack.firmware_model.cubestar.matching.identification import Identification
 from cubestack.firmware_model.cubestar.matching.pair_triangles import PairTriangles
-from cubestack.firmware_model.star_tracker.confirmation import volume
+from cubestack.firmware_model.star_tracker.confirmation import volumes
 from cubestack.firmware_model.star_tracker.observation import LARGEST_FALSE_ALARM
 from cubestack.firmware_model.star_tracker.search import MatchOutcome
 
@@ -123,7 +123,7 @@ def test_triangles_equal_exhaustive_search(catalogue: StarCatalogue, tracker: Pa
             assert step is not None
             chance += step.by_chance
             for centroids, stars in zip(step.centroids, step.stars, strict=True):
-                seen += volume(rays[centroids]) * volume(vectors[stars]) > 0
+                seen += np.prod(volumes(np.stack([rays[centroids], vectors[stars]]))) > 0
                 found.add(tuple(sorted(zip(centroids.tolist(), stars.tolist(), strict=True))))
         assert len(found ^ wanted) <= 1  # a side at the tolerance may round either way
     assert 0.4 < seen / chance < 1.2  # these stars do not cluster
