@@ -16,6 +16,7 @@ from cubestack.emulator.boards.monitor import peek
 from cubestack.emulator.iss.insight.symbols import Symbols
 from tests.compiled_costs import cubestar_times as times
 from tests.compiled_costs import pages
+from tests.tiers import quick
 
 CLOCK_PIN = 8  #: as in cubestar_times.c
 
@@ -57,7 +58,7 @@ def test_near_is_a_tenth(ms: float, near: bool) -> None:
 
 
 @needs_compiler
-@pytest.mark.parametrize("level", ["O0", "O2"])
+@pytest.mark.parametrize("level", quick(["O0", "O2"], 1))
 def test_each_loop_stores_each_byte_once_and_leaves_the_clock_low(level: str) -> None:
     calls = start_program(times.program(level, "own"), Timing())
     memory = calls.machine.external

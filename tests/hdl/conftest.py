@@ -13,6 +13,7 @@ import pytest
 from amaranth.lib.wiring import Component
 from cocotb_tools.runner import Runner
 
+from cubestack.hdl.contract import simulator
 from cubestack.hdl.flow.generate import verilog_text
 from tests.hdl import regression
 from tests.hdl.coverage import points
@@ -22,6 +23,12 @@ from tests.hdl.regression import BASE_SEED, FULL, HERE, PAIR, SIMULATOR, Outcome
 # Registers start at X instead of the value that Verilog's initialisers give them: the real part
 # has no such thing. Yosys' own helper signals keep theirs.
 INITIALISER = re.compile(r"^(\s*reg (?:\[\d+:0\] )?[^$;=]*?) = \d+'h\w+;$", re.MULTILINE)
+
+
+# For the words of failed assertions cocotb loads pytest with all its plugins, in each simulation.
+# The traced run of a failed test has them.
+REWRITING = "COCOTB_REWRITE_ASSERTION_FILES"
+os.environ.setdefault(REWRITING, "")
 
 
 @pytest.hookimpl(trylast=True)
@@ -87,7 +94,7 @@ def describe(path: Path, node: str, seed: int, failed: Outcome, again: Outcome) 
     if not path.exists():
         return "no waveform was written"
     title = f"{failed.failed[0]} of {node}, seed {seed + BASE_SEED}, on {SIMULATOR}"
-    about = {"test": node, "title": title, "error": failed.error}
+    about = {"test": node, "title": title, "error": again.error or failed.error}
     path.with_suffix(".json").write_text(json.dumps(about, indent=1), encoding="utf-8")
     alone = "" if again.failed else ", in which it passed alone"
     return f"waveform{alone}: {path}; look at it with: cubestack hdl wave {path.stem}"
@@ -162,9 +169,11 @@ class Icarus:
             case = re.sub(r"[^\w.]+", "-", first)
             path = self._kept / f"{plain_name(node)}.{case}.vcd"
             traced = make(self._folder / f"{name}-traced", traced=True)
-            again = run(traced, modules, place / "traced", only=first, waveform=path)
+            with simulator.environment(**{REWRITING: "*.py"}):
+                again = run(traced, modules, place / "traced", only=first, waveform=path)
             kept = describe(path, node, seed, outcome, again)
-            raise AssertionError(f"cocotb tests failed: {failed}\n{kept}\n{outcome.log[-6000:]}")
+            log = (again if again.failed else outcome).log
+            raise AssertionError(f"cocotb tests failed: {failed}\n{kept}\n{log[-6000:]}")
         assert not outcome.problem, f"{outcome.problem}\n{outcome.log[-4000:]}"
 
 

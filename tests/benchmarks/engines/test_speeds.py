@@ -28,7 +28,7 @@ def test_every_wired_top_has_a_workload():
         assert {*workload.stored.values()} <= {memory.name for memory in wiring.memories}
 
 
-@pytest.mark.parametrize("name", quick(WORKLOADS, 2))
+@pytest.mark.parametrize("name", quick(WORKLOADS, 1))
 def test_simulator_stores_the_sample(name):
     load = WORKLOADS[name]
     engine = make_engine(load.wiring(), "python", skipping=False)

@@ -155,7 +155,7 @@ def test_both_engines_read_the_same_bytes(seed: int) -> None:
         assert engines[0].stride_clocks > 10_000
 
 
-@pytest.mark.parametrize("timing", [None, SLOW_PARTS[-1]])
+@pytest.mark.parametrize("timing", quick([None, SLOW_PARTS[-1]], 1))
 def test_single_edges_of_the_data_clock_read_the_same_bytes(timing: SramTiming | None) -> None:
     rng = np.random.default_rng(2)
     wiring = cubestar_wiring()

@@ -13,6 +13,7 @@ from cubestack.emulator.camera.mlx75412.lens import CONDITION, LENS, UNCERTAIN
 from cubestack.emulator.camera.ov7620.scene_file import earth_sun_keys, load_earth_sun_scene
 from cubestack.emulator.scene.file import SceneError, toml_text
 from cubestack.emulator.scene.hazards import EARTH_HAZARDS, SKY_HAZARDS
+from tests.tiers import quick_ones
 
 from ..camera.conftest import save
 
@@ -109,7 +110,7 @@ def test_rejects_every_key_of_another_type_by_name(tmp_path: Path, kind: str) ->
             assert f"{name} must be " in said, said
 
 
-@pytest.mark.parametrize("kind", BASE)
+@pytest.mark.parametrize("kind", quick_ones(BASE, "earth-sun"))
 def test_scene_keys_tolerate_or_reject_huge_numbers(tmp_path: Path, kind: str) -> None:
     """A huge one is rejected by its name, or by that of what follows from it, or does no harm."""
     for name, _key, table in numbers(kind):
@@ -118,7 +119,7 @@ def test_scene_keys_tolerate_or_reject_huge_numbers(tmp_path: Path, kind: str) -
             assert not said or any(word in said for word in (name, "optics", "poses", "altitude"))
 
 
-@pytest.mark.parametrize("kind", BASE)
+@pytest.mark.parametrize("kind", quick_ones(BASE, "sky"))
 def test_scene_keys_accept_their_limits(tmp_path: Path, kind: str) -> None:
     for name, key, table in numbers(kind):
         for limit in (key[end] for end in ("low", "high") if end in key):

@@ -4,6 +4,7 @@ Rows of commands come from the interface tables.
 """
 
 from collections.abc import Iterator
+from functools import cache
 from itertools import product
 
 from cubestack.firmware_model.interface.cubesense import fpga
@@ -58,6 +59,7 @@ def name_of(command: FpgaCommand) -> str:
     return "".join("x" if level is None else str(level) for level in command.levels)
 
 
+@cache
 def row_of(*levels: int, mcu_addressing: bool) -> str:
     """The row that fits these levels, or the levels themselves where none does."""
     for command in COMMANDS + fpga.ADDRESSING_COMMANDS * mcu_addressing:

@@ -48,7 +48,7 @@ def compared(path: Path, wiring: Wiring = BOARD, **options: Any) -> ComparedCapt
     return compare_capture(read_capture(path), wiring, lambda: make_engine(wiring), **options)
 
 
-@pytest.mark.parametrize("name", quick_ones(BOARDS, "cubestar", "cubestar-shared"))
+@pytest.mark.parametrize("name", quick_ones(BOARDS, "cubestar"))
 def test_capture_of_the_emulated_board_is_equal(name: str, tmp_path: Path) -> None:
     board = BOARDS[name]
     wiring = board.wiring(False)
