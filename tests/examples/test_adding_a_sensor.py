@@ -15,6 +15,7 @@ from cubestack.host.devices.registry import device
 from cubestack.host.ground import scenes
 
 from ..conftest import Run
+from ..forked import forked, of_pytest
 from .conftest import ROOT, Installed, installed, plugins
 
 Command = Callable[..., str]
@@ -120,8 +121,8 @@ class TestEditedSensor:
 def test_tests_of_the_new_sensor_pass(tmp_path: Path) -> None:
     with new_sensor(tmp_path) as glow:
         tests = tmp_path / "glow-sensor" / "tests"
-        done = glow.run(sys.executable, "-m", "pytest", "-q", *plugins(), tests)
-        assert done.returncode == 0, done.stdout
+        done = forked(of_pytest("-q", *plugins(), tests), environment=glow.environment)
+        assert done.code == 0, done.out
 
 
 @pytest.mark.slow

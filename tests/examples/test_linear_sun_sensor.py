@@ -16,6 +16,7 @@ from cubestack.host.emulation.process import emulating
 from cubestack.host.ground import scenes
 
 from ..conftest import Run
+from ..forked import command, forked, of_pytest
 from .conftest import ROOT, Installed, installed, plugins
 
 PROJECT = ROOT / "examples" / "linear_sun_sensor"
@@ -211,14 +212,14 @@ def test_emulated_port_is_opened_by_another_process(sensor: Installed, tmp_path:
     assert found.angle_deg == pytest.approx(TRUTH_DEG, abs=TOLERANCE_DEG)
 
 
-def test_guest_program_finds_the_plugin_device_on_i2c(sensor: Installed) -> None:
+def test_guest_program_finds_the_plugin_device_on_i2c() -> None:
     program: tuple[Any, ...] = ("i2cget", "-y", "7", "0x28", "0x80")
     if shutil.which(program[0]) is None:
         read = "import smbus2; print(hex(smbus2.SMBus(7).read_byte_data(0x28, 0x80)))"
         program = (sys.executable, "-c", read)
-    command = (sys.executable, "-m", "cubestack", "run", "--device", "sunslit")
-    done = sensor.run(*command, "--pace", "fast", "--", *program)
-    assert (done.returncode, done.stdout.strip()) == (0, "0x28"), done.stderr
+    words = ("run", "--device", "sunslit", "--pace", "fast", "--", *program)
+    done = forked(command(*words))
+    assert (done.code, done.out.strip()) == (0, "0x28"), done.err
 
 
 def test_plugin_device_provides_a_pytest_fixture(sensor: Installed, tmp_path: Path) -> None:
@@ -231,5 +232,5 @@ def test_plugin_device_provides_a_pytest_fixture(sensor: Installed, tmp_path: Pa
         "    sunslit.faults.inject('camera-dead')\n"
         "    assert sunslit.client.measure().outcome.name == 'NO_READOUT'\n"
     )
-    done = sensor.run(sys.executable, "-m", "pytest", "-q", *plugins(), test)
-    assert done.returncode == 0, done.stdout
+    done = forked(of_pytest("-q", *plugins(), test), environment=sensor.environment)
+    assert done.code == 0, done.out

@@ -14,6 +14,8 @@ from PIL import Image
 
 from cubestack.host.emulation.emulated import open_device
 from cubestack.host.experiments.attitude import errors
+from tests.conftest import Outcome
+from tests.forked import forked
 from tests.system.conftest import ROOT, compile_c
 
 HERE = ROOT / "examples"
@@ -34,6 +36,16 @@ def flight_driver(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def run(*command: str | Path, cwd: Path | None = None) -> "subprocess.CompletedProcess[str]":
     return subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=TIMEOUT_S)
+
+
+def script(path: Path, *words: object) -> Outcome:
+    """Runs a program in Python, with words, in a fork of this process."""
+
+    def main() -> None:
+        sys.argv = [str(path), *map(str, words)]
+        runpy.run_path(str(path), run_name="__main__")
+
+    return forked(main)
 
 
 def check_attitude(device: Any, output: str) -> None:
@@ -112,10 +124,9 @@ def test_driver_suite_passes(tmp_path: Path) -> None:
     ],
 )
 def test_missing_target_prints_usage(name: str) -> None:
-    done = subprocess.run([sys.executable, HERE / name], capture_output=True, text=True)
-    assert done.returncode == 1
-    assert done.stderr.startswith(f"usage: python {name} ")
-    assert len(done.stderr.splitlines()) == 1
+    done = script(HERE / name)
+    assert done.code == 1
+    assert done.line.startswith(f"usage: python {name} ")
 
 
 @pytest.fixture(scope="module")
@@ -169,8 +180,8 @@ def test_one_orbit_writes_results_and_a_figure(tmp_path: Path) -> None:
 
 def test_slew_animation_writes_a_gif(tmp_path: Path) -> None:
     path = tmp_path / "slew.gif"
-    call = [sys.executable, HERE / "slew_animation.py", path, "3"]
-    done = subprocess.run(call, capture_output=True, text=True, check=True)
-    assert "3 frames, 3 of them with an attitude" in done.stdout
+    done = script(HERE / "slew_animation.py", path, 3)
+    assert done.code == 0
+    assert "3 frames, 3 of them with an attitude" in done.out
     with Image.open(path) as drawn:
         assert (drawn.n_frames, drawn.width) == (3, 640)

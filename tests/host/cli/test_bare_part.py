@@ -7,11 +7,11 @@ import pytest
 
 from cubestack.host.cli.main import main
 from cubestack.host.emulation.emulated import open_device
-from cubestack.host.emulation.process import emulating
 from cubestack.host.emulation.remote_controls import TOKEN, ControlClient
 from cubestack.host.errors import TargetError
 from tests.emulator.boards.efm32gg.programs import application, needs_both_compilers, unit_tests
 from tests.emulator.recording import vcd
+from tests.forked import Served
 
 pytestmark = needs_both_compilers
 
@@ -88,8 +88,8 @@ def test_stimulus_presses_the_button_and_the_trace_shows_the_led(app: str, tmp_p
 def test_serial_blocks_lead_to_places_of_their_own(app: str, tmp_path: Path) -> None:
     first, second = tmp_path / "first", tmp_path / "second"
     words = ["--serial", f"uart0@PE0,PE1:{first}", "--serial", f"usart1@PD0,PD1:{second}"]
-    with emulating(["efm32gg", "--firmware", app, *words]) as said:
-        line = next(one for one in said if "serves on" in one)
+    with Served(["efm32gg", "--firmware", app, *words], tmp_path) as served:
+        line = served.said.splitlines()[-1]
         assert f"uart0@PE0,PE1 on {first} at 115200 baud" in line
         assert f"usart1@PD0,PD1 on {second} at 115200 baud" in line
         assert first.is_symlink()
@@ -98,15 +98,18 @@ def test_serial_blocks_lead_to_places_of_their_own(app: str, tmp_path: Path) -> 
 
 def test_serial_block_of_a_sensors_board_has_its_own_port(app: str, tmp_path: Path) -> None:
     star = ["cubestar", "--firmware", app, "--pty", str(tmp_path / "star")]
-    with emulating([*star, "--serial", "uart0@PE0,PE1:0"]) as said:
-        line = next(one for one in said if "serves on" in one)
+    with Served([*star, "--serial", "uart0@PE0,PE1:0"], tmp_path) as served:
+        line = served.said.splitlines()[-1]
         assert f"serves on {tmp_path / 'star'} at 57600 baud, uart0@PE0,PE1 on tcp://" in line
 
 
-def test_control_port_drives_pins_and_reads_them(app: str) -> None:
+def test_control_port_drives_pins_and_reads_them(
+    app: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(TOKEN, "secret")
     words = ["efm32gg", "--firmware", app, "--tcp", "0", "--control", "0", "--pace", "fast"]
-    with emulating(words, {TOKEN: "secret"}) as said:
-        line = next(one for one in said if one.startswith("control on"))
+    with Served(words, tmp_path) as served:
+        (line,) = (one for one in served.said.splitlines() if one.startswith("control on"))
         client = ControlClient(line.split()[2].rstrip(","), "secret")
 
         def act(*words: str) -> None:

@@ -15,6 +15,7 @@ from cubestack.host.emulation.process import emulating
 from cubestack.host.emulation.remote_controls import TOKEN, ControlClient
 from cubestack.host.errors import PortOpenError
 from cubestack.host.targets import open_target
+from tests.forked import Served
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
 
@@ -74,17 +75,29 @@ def test_several_devices_share_a_bus_and_have_their_own_ports() -> None:
     assert re.search(r"^CubeSense serves on tcp://\S+ at 57600 baud, .*\w+ on tcp://\S+ at", line)
 
 
+@contextmanager
+def in_a_fork(*words: object, folder: Path, last: str) -> Iterator[list[str]]:
+    """The same without the time that a process takes to start."""
+    said = list[str]()
+    with Served([*words, "--pace", "fast"], folder, last=f"{last} serves on ") as served:
+        said += served.said.splitlines()
+        yield said
+    said[:] = served.said.splitlines()
+
+
 def test_emulate_prints_fault_events(tmp_path: Path) -> None:
     plan, port = tmp_path / "plan.toml", tmp_path / "tty"
     plan.write_text("[[fault]]\nkind = 'latch-up'\ntarget = 'imager'\nat_s = 1e-4\n", "utf-8")
-    with serving("cubestar", "--pty", port, "--faults", plan, last="CubeStar") as said:
+    words = ("cubestar", "--pty", port, "--faults", plan)
+    with in_a_fork(*words, folder=tmp_path, last="CubeStar") as said:
         assert node_type(port, "cubestar") == 5
     assert any("latch-up imager" in line for line in said)
 
 
-def test_control_needs_its_token(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_control_needs_its_token(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv(TOKEN, "a-secret")
-    with serving("aramis", "--tcp", "0", "--control", "0", last="AraMiS") as said:
+    words = ("aramis", "--tcp", "0", "--control", "0")
+    with in_a_fork(*words, folder=tmp_path, last="AraMiS") as said:
         (line,) = (line for line in said if line.startswith("control on "))
         url, told = re.findall(r"control on (\S+), token (\S+)", line)[0]
         assert told == "a-secret"

@@ -17,7 +17,7 @@ from cubestack.firmware_model.interface.cubesense.codes import ImageSize
 from cubestack.host.cli.main import main
 from cubestack.host.clients.cubesense import client
 from cubestack.host.clients.cubesense.download import download_image
-from cubestack.host.emulation.process import emulating
+from tests.forked import Served
 from tests.tiers import quick_ones
 
 TIMEOUT_S = 60
@@ -146,8 +146,8 @@ def serving(kind, folder):
     """Serves a CubeSense on a port of ``kind``; yields the target that opens it."""
     given = {"pty": ["--pty", str(folder / "tty")], "i2c": ["--i2c", str(BUS), "--tcp", "0"]}
     words = ["cubesense", "--pace", "fast", *given.get(kind, [f"--{kind}", "0"])]
-    with emulating(words, {"COLUMNS": "500"}) as said:
-        line = next(line for line in said if line.startswith("CubeSense serves on "))
+    with Served(words, folder, last="CubeSense serves on ") as served:
+        line = served.said.splitlines()[-1]
         yield f"i2c:{BUS}:0x1b" if kind == "i2c" else line.split()[3]
 
 

@@ -1,17 +1,17 @@
 """Every argument of every command refuses wrong inputs in one line of plain words."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
-from .wrong_inputs import TEXTS, arguments, cases, problem
+from tests.conftest import Outcome
+from tests.forked import forked
+
+from .wrong_inputs import TEXTS, arguments, cases, problem, try_all
 
 
-def tried(count: int, seed: int) -> subprocess.CompletedProcess[str]:
-    call = [sys.executable, "-m", "tests.host.cli.wrong_inputs", str(count), str(seed)]
-    return subprocess.run(call, capture_output=True, text=True, timeout=900)
+def tried(count: int, seed: int) -> Outcome:
+    return forked(lambda: try_all(count, seed), timeout=900)
 
 
 def test_cases_cover_every_argument(tmp_path: Path) -> None:
@@ -37,10 +37,10 @@ def test_bad_ends_are_noticed(status: int, said: str) -> None:
 
 def test_a_few_wrong_inputs_are_refused_in_one_line() -> None:
     done = tried(12, 1)
-    assert done.returncode == 0, done.stdout + done.stderr
+    assert done.code == 0, done.out + done.err
 
 
 @pytest.mark.slow
 def test_wrong_inputs_are_refused_in_one_line() -> None:
     done = tried(200, 2)
-    assert done.returncode == 0, done.stdout + done.stderr
+    assert done.code == 0, done.out + done.err
