@@ -9,6 +9,7 @@ from collections.abc import Callable, Generator
 from contextlib import closing
 from dataclasses import KW_ONLY, dataclass
 from fractions import Fraction
+from functools import lru_cache
 from math import ceil
 from typing import Any, Protocol
 
@@ -213,7 +214,7 @@ class Processor:
 
     @property
     def _cycle(self) -> Fraction:
-        return Fraction(PS_PER_S, self._clock.hz)
+        return _ps(1, self._clock.hz)
 
     def _follow(self) -> None:
         """Run the FPGA to the kernel's time; after accesses in an interrupt it is ahead."""
@@ -277,7 +278,7 @@ class Processor:
         return False
 
     def _strobe_read(self, request: requests.StrobeRead) -> Steps:
-        period = Fraction(request.cycles * PS_PER_S, self._clock.hz)
+        period = _ps(request.cycles, self._clock.hz)
         done = 0
         while done < len(request.target):
             yield from self._spend_cycles()
@@ -304,6 +305,11 @@ class Processor:
             if not request.write and request.data[done - 1] > request.above:
                 break
         return done
+
+
+@lru_cache(maxsize=64)  # a processor has few loops, but runs each many times
+def _ps(cycles: int, hz: int) -> Fraction:
+    return Fraction(cycles * PS_PER_S, hz)
 
 
 def _place(routine: Any) -> str:
