@@ -439,7 +439,10 @@ class DeclaredValues:
 
     def check_within(self, name: str, **limits: float) -> None:
         """Check a value against a ``low`` or ``high`` that depends on other values."""
-        self._check(replace(self._declared[name], **limits))  # type: ignore[arg-type]
+        one, value = self._declared[name], getattr(self, name)
+        inside = limits.get("low", value) <= value <= limits.get("high", value)
+        if not inside or one.exclusive:
+            self._check(replace(one, **limits))  # type: ignore[arg-type]
 
     def _check(self, one: Declaration) -> None:
         try:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic
 
@@ -40,13 +41,13 @@ class Opener(Generic[BoardT_co, ClientT_co]):
     #: called with each device after power-up
     opened: Callable[[EmulatedDevice[BoardT_co, ClientT_co]], object] = lambda _emulated: None
 
-    @property
+    @cached_property
     def switches(self) -> Switches:
         """Switches of the firmware at power-up."""
         chosen = self.board.get("profile", DEFAULT_PROFILE), self.board.get("set", "")
         return self.device.switches.of(*chosen)
 
-    @property
+    @cached_property
     def rates(self) -> bool:
         """Whether the firmware rates its results: the Python model, except in ``published``."""
         return not self.board.get("firmware") and self.switches.profile != DEFAULT_PROFILE
