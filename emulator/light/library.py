@@ -49,6 +49,7 @@ _P, _I, _L, _D = ctypes.c_void_p, ctypes.c_int32, ctypes.c_int64, ctypes.c_doubl
 _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "light_grey_values": (None, (_P, _I, _I, _P)),
     "light_undistorted": (None, (_P, _P, _L, _I, _D, _P)),
+    "light_displaced": (None, (_P, _P, _P, _P, _L, _P, _P)),
     "light_spots": (None, (_P, _P, _L, _D, _I, _P, _I, _I, _P)),
     "light_globe": (_L, (_P, _P, _P, _L, _P, _P)),
 }

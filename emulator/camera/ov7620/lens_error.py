@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cubestack.emulator.camera.common.residual import Displacement
+from cubestack.emulator.light.lens_curve import LensCurve
 from cubestack.emulator.scene.earth_sun import CameraTarget
 from cubestack.emulator.scene.file import SceneError
 from cubestack.firmware_model.values import REQUIRED, DeclaredValues, many, number, vector
@@ -97,15 +98,8 @@ class LensError(DeclaredValues):
         """As `displace`, with arrays of their own, which is faster."""
         if not self.radial_deg and not any(self.decentring_deg):
             return alpha, beta
-        theta = np.hypot(alpha, beta)
-        stretch = 1 + self._radial(theta) / np.where(theta == 0, 1, theta)
-        x, y = alpha / FIELD_DEG, beta / FIELD_DEG
-        square = x * x + y * y
-        p1, p2 = self.decentring_deg
-        fading = np.maximum(1 - square, 0)
-        across = fading * (p2 * (square + 2 * x * x) + 2 * p1 * x * y)
-        down = fading * (p1 * (square + 2 * y * y) + 2 * p2 * x * y)
-        return alpha * stretch + across, beta * stretch + down
+        nodes, values = np.array([(0.0, 0.0), *self.radial_deg, (FIELD_DEG, 0.0)]).T
+        return LensCurve(nodes, values, *self.decentring_deg).displaced(alpha, beta)
 
     def restore(self, displaced: ArrayLike) -> Angles:
         """Inverse of `displace`, to 1e-9 deg within the field."""
@@ -118,21 +112,6 @@ class LensError(DeclaredValues):
             if not max(np.abs(one).max() for one in missed) > _INVERSION_DEG:
                 break
         return np.stack([alpha, beta], axis=-1)
-
-    def _radial(self, theta: Angles) -> Angles:
-        """Outward error at field angles: Hermite's cubics, extremes at nodes only (Fritsch)."""
-        pairs = [(0.0, 0.0), *self.radial_deg, (FIELD_DEG, 0.0)]
-        nodes, values = np.array(pairs).T
-        rise = np.diff(values) / np.diff(nodes)
-        turns = rise[:-1] * rise[1:] <= 0
-        mean = 2 * rise[:-1] * rise[1:] / np.where(turns, 1, rise[:-1] + rise[1:])
-        slopes = np.array([rise[0], *np.where(turns, 0, mean), 0.0])
-        first = np.clip(np.searchsorted(nodes, theta, "right") - 1, 0, len(nodes) - 2)
-        width = nodes[first + 1] - nodes[first]
-        s = np.clip((theta - nodes[first]) / width, 0, 1)
-        begins = (1 + 2 * s) * values[first] + s * width * slopes[first]
-        ends = (3 - 2 * s) * values[first + 1] - (1 - s) * width * slopes[first + 1]
-        return np.asarray((1 - s) ** 2 * begins + s**2 * ends)
 
 
 #: A lens that is exactly as the firmware assumes.

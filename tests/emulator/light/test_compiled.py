@@ -9,6 +9,7 @@ import pytest
 from cubestack.emulator.camera.mlx75412.sensor import Mlx75412
 from cubestack.emulator.light import globe, library, pixels, spots
 from cubestack.emulator.light.distortion import Brown
+from cubestack.emulator.light.lens_curve import LensCurve
 from cubestack.emulator.light.noise import FrameNoise
 from cubestack.emulator.light.pixels import PixelModel
 from cubestack.emulator.native import compiler
@@ -169,6 +170,23 @@ def test_points_without_distortion_are_equal(seed: int) -> None:
     found = np.isfinite(expected).all(axis=1)
     assert found.sum() > 300
     np.testing.assert_allclose(lens.of(expected[found]), targets[found], atol=1e-12)
+
+
+@needs_compiler
+@pytest.mark.parametrize("seed", range(6))
+def test_displacements_by_a_lens_are_equal(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    nodes = np.array([0.0, *np.sort(rng.uniform(5, 90, seed)), 95.0])
+    values = np.array([0.0, *rng.normal(0, 1, seed), 0.0])
+    lens = LensCurve(nodes, values, *rng.normal(0, 0.1, 2))
+    x, y = rng.uniform(-100, 100, (2, 5001))
+    x[:40], y[:30], y[30:40] = np.resize(nodes, 40), 0, -0.0  # on the nodes
+    expected = lens.reference(x, y)
+    found = lens.compiled(library.light_library(), x, y)
+    np.testing.assert_array_equal(np.stack(found), np.stack(expected))
+    assert (found[0] != x).mean() > 0.5
+    some = lens.displaced(x[:7], y[:7])  # few points, without the library
+    np.testing.assert_array_equal(np.stack(some), np.stack(expected)[:, :7])
 
 
 @needs_compiler
