@@ -242,6 +242,7 @@ class Board(ABC):
         line = self._serial_line(baud, link)
         line.frame_end = lambda: getattr(link(), "frame_end", None)
         line.on_block = lambda data: link().uart_block(data)
+        line.heeds_silence = lambda: getattr(link(), "receiving", True)
         self.i2c_bus.attach(i2c_address, Forwarder(lambda: [link()]))
 
     def _serial_line(

@@ -54,6 +54,7 @@ class Uart:
         on_byte: interrupt: a byte was received.
         on_silence: interrupt: nothing was received for ``silence_bytes`` byte times. Raised once,
             and again only after another byte.
+        heeds_silence: returns whether a silence from now on would mean anything to the program.
         taps: observers at the device's end.
         host_taps: called with each byte to the device and its start, when it ends on the line and
             before a fault changes it.
@@ -79,6 +80,7 @@ class Uart:
         self.byte_ps = self.form.character_ps
         self.on_byte = on_byte
         self.on_silence = on_silence
+        self.heeds_silence: Callable[[], bool] = lambda: True
         self.line: Callable[[bytes, int, int], None] = lambda _data, _first_ps, _byte_ps: None
         self.taps: list[UartTap] = []
         self.host_taps: list[Callable[[int, int], None]] = []
@@ -164,6 +166,8 @@ class Uart:
 
     def _await_silence(self) -> None:
         """Raise ``on_silence`` when nothing arrives for a while; one timer serves many frames."""
+        if not self.heeds_silence():
+            return
         self._silent_at = self._env.now + self._silence_ps
         if not self._silence_awaited:
             self._wake_at(self._silent_at)

@@ -73,6 +73,15 @@ def test_short_pause_is_not_a_silence(desk):
     assert len(desk.received) == 10
 
 
+def test_silence_that_means_nothing_to_the_program_is_no_event(desk):
+    desk.uart.heeds_silence = lambda: desk.data.endswith(b"a")
+    for data in (b"b", b"a", b"ab"):
+        desk.uart.host_writes(data)
+        desk.kernel.run()
+    assert desk.silences == [(1 + 1 + SILENCE) * BYTE]
+    assert desk.kernel.now == (1 + 1 + SILENCE + 2) * BYTE
+
+
 def test_byte_written_at_the_end_of_a_silence_is_received(desk):
     desk.uart.host_writes(b"a")
     desk.kernel.advance_to((1 + SILENCE) * BYTE)
