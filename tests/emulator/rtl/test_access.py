@@ -209,9 +209,12 @@ def test_bus_access_errors_state_the_accepted_values(shared: RtlEngine) -> None:
         BusTiming(1, 1, 1, 64, 1)
 
 
+OWN = cubestar_wiring()  # once, as a new one is hashed anew
+
+
 @pytest.fixture
 def wiring() -> Wiring:
-    return cubestar_wiring()
+    return OWN
 
 
 @pytest.fixture
@@ -223,7 +226,7 @@ def engine(wiring: Wiring) -> Iterator[CompiledEngine]:
     engine.close()
 
 
-@pytest.mark.parametrize("wiring", [cubestar_wiring(), cubesense_wiring(CubeSensePair())])
+@pytest.mark.parametrize("wiring", [OWN, cubesense_wiring(CubeSensePair())])
 def test_engine_registers_have_the_names_of_the_design(engine: CompiledEngine) -> None:
     assert all(bits > 0 for bits in engine.registers.values())
     names = {name.rsplit(".", 1)[-1] for name in engine.registers}
@@ -274,7 +277,7 @@ def test_rejects_unknown_register_bits_listing_known_ones(engine: CompiledEngine
 
 
 def test_simulator_reports_unsupported_bit_flips() -> None:
-    engine = SimulatedEngine(cubestar_wiring())
+    engine = SimulatedEngine(OWN)
     assert engine.registers == {}
     with pytest.raises(ValueError, match="only the compiled engine"):
         engine.flip("writer.ack", 0)

@@ -1,6 +1,7 @@
 """Compiled engine against Amaranth's simulator, skipping against not skipping: all the same."""
 
 from fractions import Fraction
+from functools import cache
 
 import numpy as np
 import pytest
@@ -27,6 +28,7 @@ from .cameras import (
 SIZES = [(8, 4), (5, 3)]
 
 
+@cache
 def wiring(size: tuple[int, int]) -> Wiring:
     return cubestar_wiring(CubeStarTop(*size))
 
@@ -131,7 +133,7 @@ def test_engines_agree_on_random_pin_events(seed):
 def test_compiled_engine_skips_an_hour_of_blanking():
     """An hour of blanking costs nothing, and the frame behind it is stored all the same."""
     camera = plain_camera(blank=36_000_000_000)
-    engine = make_engine(cubestar_wiring(CubeStarTop(*SIZES[0])), "compiled")
+    engine = make_engine(BOARD, "compiled")
     engine.attach(camera)
     engine.set_pin("ENABLE", 1)
     start = camera.segments[1].start_ps
@@ -143,7 +145,7 @@ def test_memory_timing_limits_reach_both_engines():
     slow = SramTiming(write_pulse_ps=60_000, data_setup_ps=110_000)
     counts = []
     for kind in ("compiled", "python"):
-        engine = make_engine(cubestar_wiring(CubeStarTop(*SIZES[0])), kind, slow)
+        engine = make_engine(BOARD, kind, slow)
         engine.attach(plain_camera(frames=1))
         engine.set_pin("ENABLE", 1)
         engine.run(10**10)

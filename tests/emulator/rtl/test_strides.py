@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from fractions import Fraction
-from functools import partial
+from functools import cache, partial
 from itertools import product
 
 import numpy as np
@@ -31,7 +31,8 @@ pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler
 
 PERIOD = Fraction(10**12, 12_300_000)
 COLUMNS, ROWS = 1024, 512
-BOARDS = (cubestar_wiring, cubestar_shared_wiring, cubestar_double_wiring)
+own = cache(cubestar_wiring)
+BOARDS = (own, cache(cubestar_shared_wiring), cache(cubestar_double_wiring))
 
 #: Each is one that a stride would break: for those it must not be made.
 SLOW_PARTS = (
@@ -137,7 +138,7 @@ def test_both_engines_of_the_pair_store_the_same_images(gateware: str, seed: int
 @pytest.mark.parametrize("seed", quick(range(3), 1))
 def test_both_engines_read_the_same_bytes(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    with both(cubestar_wiring()) as engines:
+    with both(own()) as engines:
         engines[0].sram[:] = engines[1].sram[:] = rng.integers(0, 256, 2 * COLUMNS * ROWS)
         for engine in engines:
             for pin in ("RNW", "BANK", "ENABLE"):
@@ -158,7 +159,7 @@ def test_both_engines_read_the_same_bytes(seed: int) -> None:
 @pytest.mark.parametrize("timing", quick([None, SLOW_PARTS[-1]], 1))
 def test_single_edges_of_the_data_clock_read_the_same_bytes(timing: SramTiming | None) -> None:
     rng = np.random.default_rng(2)
-    wiring = cubestar_wiring()
+    wiring = own()
     seen = (*wiring.output_pins, *wiring.mcu_pins)
     with both(wiring, timing) as engines:
         engines[0].sram[:] = engines[1].sram[:] = rng.integers(0, 256, 2 * COLUMNS * ROWS)
@@ -190,7 +191,7 @@ def test_single_edges_of_the_data_clock_read_the_same_bytes(timing: SramTiming |
 def test_both_engines_report_the_same_violations_of_a_slow_memory(timing: SramTiming) -> None:
     rng = np.random.default_rng(1)
     source = camera(rng, 12)
-    with both(cubestar_wiring(), timing) as engines:
+    with both(own(), timing) as engines:
         for engine in engines:
             engine.attach(source)
             engine.set_pin("ENABLE", 1)
@@ -205,7 +206,7 @@ def test_both_engines_report_the_same_violations_of_a_slow_memory(timing: SramTi
 
 def test_strides_can_be_switched_off() -> None:
     source = camera(np.random.default_rng(0), 4)
-    with both(cubestar_wiring()) as (engine, _):
+    with both(own()) as (engine, _):
         engine.use_strides(False)
         engine.attach(source)
         engine.set_pin("ENABLE", 1)

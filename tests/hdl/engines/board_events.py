@@ -5,6 +5,7 @@ Every event is an instant of its own, so that what each engine settles on is def
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -200,6 +201,7 @@ def _cubesense(mcu_addressing: bool) -> Script:
 
 
 def _pair(mcu_addressing: bool) -> Board:
+    @cache
     def wiring(narrow: bool) -> Wiring:
         columns = SMALLEST.columns - narrow
         return cubesense_wiring(CubeSensePair(replace(SMALLEST, columns=columns), mcu_addressing))
@@ -209,7 +211,7 @@ def _pair(mcu_addressing: bool) -> Board:
 
 
 def _star(make: Callable[[Any], Wiring], top: type[CubeStarBoard], script: Script) -> Board:
-    return Board(lambda narrow: make(top(COLUMNS - narrow, ROWS)), COLUMNS, ROWS, 9, script)
+    return Board(cache(lambda narrow: make(top(COLUMNS - narrow, ROWS))), COLUMNS, ROWS, 9, script)
 
 
 #: By the top's name, as the command line has it.

@@ -7,12 +7,12 @@ import threading
 import tty
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from amaranth.hdl import Module
-from amaranth.lib.wiring import In
 
 from cubestack.emulator.rtl import board_model
 from cubestack.emulator.rtl.board_model.board import SimulatedBoard
@@ -68,23 +68,25 @@ class Bare(PinnedComponent):
         return m
 
 
+@cache
+def _bare(wiring: Wiring) -> Wiring:
+    return Wiring(
+        Bare(wiring.component),
+        cameras=(CameraPins("unused", *(f"{UNUSED}{pin}" for pin in _CAMERA)),),
+        memories=(MemoryPins("unused", UNUSED),),
+        data_clock=wiring.data_clock,
+        data=wiring.data,
+        acknowledges=wiring.acknowledges,
+        storing=lambda _level: (),
+        settling_clocks=0,
+    )
+
+
 class CompiledDesign:
     """A design at its pins, for ``DevboardModel``."""
 
     def __init__(self, wiring: Wiring) -> None:
-        bare = Bare(wiring.component)
-        bare_wiring = Wiring(
-            bare,
-            cameras=(CameraPins("unused", *(f"{UNUSED}{pin}" for pin in _CAMERA)),),
-            memories=(MemoryPins("unused", UNUSED),),
-            data_clock=wiring.data_clock,
-            data=wiring.data,
-            acknowledges=wiring.acknowledges,
-            storing=lambda _level: (),
-            settling_clocks=0,
-        )
-        self.engine = CompiledEngine(bare_wiring)
-        self._inputs = {name for name, m in bare.signature.members.items() if m.flow is In}
+        self.engine = CompiledEngine(_bare(wiring))
 
     def set(self, levels: dict[str, int]) -> None:
         for name, level in levels.items():
@@ -94,9 +96,12 @@ class CompiledDesign:
         return self.engine.get_pin(name)
 
 
+_hash = cache(design_hash)
+
+
 def model(wiring: Wiring, name: str = "top") -> DevboardModel:
     pins, lines = wiring.component.pins, lines_of(wiring)
-    identity = bytes.fromhex(design_hash(wiring.component))[:8]
+    identity = bytes.fromhex(_hash(wiring.component))[:8]
     return DevboardModel(pins, lines, CompiledDesign(wiring), name=name, design_hash=identity)
 
 
