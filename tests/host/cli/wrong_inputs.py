@@ -18,6 +18,7 @@ import time
 import traceback
 from collections import Counter
 from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -106,6 +107,9 @@ class Case(NamedTuple):
     words: tuple[str, ...]
 
 
+_parser = cache(make_parser)
+
+
 def arguments() -> Iterator[Argument]:
     """All arguments that take a value, of all commands and their actions."""
     return (one for one in all_arguments() if one.action.nargs != 0)
@@ -113,7 +117,7 @@ def arguments() -> Iterator[Argument]:
 
 def all_arguments() -> Iterator[Argument]:
     """The same, and flags."""
-    yield from _arguments((), make_parser())
+    yield from _arguments((), _parser())
 
 
 def _arguments(command: tuple[str, ...], parser: argparse.ArgumentParser) -> Iterator[Argument]:

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import scipy  # which loads its parts when they are used
 from PIL import Image
-from scipy.stats import binomtest
 
 from cubestack.host.devices.experiment import Section
 from cubestack.host.studies.campaign import report
@@ -66,7 +66,7 @@ def test_rates_and_errors_count_the_rows(make: Make) -> None:
 
 @pytest.mark.parametrize(("one", "other"), [(0, 0), (0, 1), (3, 9), (9, 3), (40, 41), (0, 30)])
 def test_by_chance_equals_a_binomial_test(one: int, other: int) -> None:
-    expected = binomtest(one, one + other).pvalue if one + other else 1.0
+    expected = scipy.stats.binomtest(one, one + other).pvalue if one + other else 1.0
     assert by_chance(one, other) == pytest.approx(expected)
 
 
@@ -127,7 +127,7 @@ def test_report_page_is_self_contained(make: Make) -> None:
             assert image.width > 400
     assert not re.search(r"https?://", text)
     assert "<b>broken</b>" in told.cells
-    limits = binomtest(100, FRAMES).proportion_ci(0.95, "wilson")
+    limits = scipy.stats.binomtest(100, FRAMES).proportion_ci(0.95, "wilson")
     assert f"100 ({100 * limits.low:.2f} to {100 * limits.high:.2f} %)" in told.cells
     assert "false_stars = 9, hazard = ('moon',)" in told.cells
 

@@ -2,6 +2,7 @@
 
 import random
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -64,9 +65,14 @@ def test_all_rows_together_take_at_most_twenty_minutes_on_two_cores() -> None:
 JOBS = [job for device in BUILT_IN for job in all_jobs(device)]
 
 
+@cache
+def seconds(device: str) -> dict[str, float]:
+    return {key: one.seconds for key, one in load(record_file(DOCS, device)).items()}
+
+
 def case(job: Job) -> Any:
     """A test's case: daily below 20 s, else weekly."""
-    long = load(record_file(DOCS, job.device))[job.key].seconds >= 20
+    long = seconds(job.device)[job.key] >= 20
     mark = pytest.mark.weekly if long else pytest.mark.daily
     return pytest.param(job, id=f"{job.device} {job.key}", marks=mark)
 

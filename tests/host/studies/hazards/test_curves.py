@@ -4,8 +4,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+import scipy  # which loads its parts when they are used
 from PIL import Image
-from scipy.stats import binomtest
 
 from cubestack.host.devices.registry import device
 from cubestack.host.experiments.hazard_options import known
@@ -27,7 +27,7 @@ from tests.together import together
 
 @pytest.mark.parametrize(("count", "of"), [(0, 20), (1, 20), (13, 40), (20, 20), (3, 1000)])
 def test_wilson_limits_match_scipy(count: int, of: int) -> None:
-    other = binomtest(count, of).proportion_ci(0.95, "wilson")
+    other = scipy.stats.binomtest(count, of).proportion_ci(0.95, "wilson")
     assert wilson(count, of) == pytest.approx((other.low, other.high), abs=1e-5)
     assert wilson(0, 0) == (0.0, 1.0)
 
