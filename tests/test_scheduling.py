@@ -63,6 +63,24 @@ def test_every_test_runs_once_and_a_group_on_one_worker(config: pytest.Config) -
     assert {name for name, _ in ran[:20]} <= {*GROUPED}, "groups are first"
 
 
+def test_a_file_s_tests_run_on_few_workers(config: pytest.Config) -> None:
+    files = [f"test_{number}.py" for number in range(250)]
+    scheduler, workers = scheduled(
+        config, [f"{file}::test_{n}" for file in files for n in range(20)]
+    )
+    assert scheduler.collection is not None
+    used: dict[str, set[int]] = {file: set() for file in files}
+    turn = 0
+    while any(len(worker.waiting) > 1 for worker in workers):
+        turn += 1
+        number = turn % 2 if workers[turn % 2].waiting else 1 - turn % 2
+        place = workers[number].waiting.pop(0)
+        used[scheduler.collection[place].partition("::")[0]].add(number)
+        scheduler.mark_test_complete(workers[number], place)
+    early = [len(used[file]) for file in files[:140]]
+    assert sum(early) < 1.2 * len(early)
+
+
 def test_tests_of_a_dead_worker_are_run_by_the_other(config: pytest.Config) -> None:
     scheduler, (dead, other) = scheduled(config, SINGLE[:10])
     first = SINGLE[dead.waiting[0]]
