@@ -78,6 +78,7 @@ def test_finds_the_baud_rate(how: str, tmp_path: Path) -> None:
     with emulating(["cubesense", "--baud", "38400", *words]) as said:
         served = next(found[1] for one in said if (found := SERVES.search(one)))
         target = open_target(served, "cubesense", baud=19200)
+        target.node._timeout_s = 0.5  # of silence, of which there is much
         shell = Shell(target)
         with pytest.raises(NoAnswerError, match="it answers at 38400 baud, and this is 19200"):
             shell.execute("read Identification")

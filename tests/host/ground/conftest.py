@@ -56,7 +56,8 @@ def listening(
     """A WebSocket to ``path``, by default with the token."""
     address = serving.url.replace("http:", "ws:") + path
     told = BEARER if headers is None else headers
-    return connect(address, additional_headers=told, open_timeout=SOON_S)
+    # Where messages wait to be read, the answer to its end does, too, and does not come.
+    return connect(address, additional_headers=told, open_timeout=SOON_S, close_timeout=1.0)
 
 
 @contextmanager
