@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from cubestack.host.errors import install_command
+from tests.forked import command, forked
 from tests.tiers import quick
 
 CALL = [sys.executable, "-m", "cubestack"]
@@ -91,9 +92,9 @@ def test_commands_run_in_an_ascii_locale(command: str) -> None:
     ),
 )
 def test_missing_file_or_port_is_named(words: list[str], file: str) -> None:
-    ended = subprocess.run([*CALL, "ground", *words], capture_output=True, text=True, timeout=60)
-    assert ended.returncode == 1
-    assert file in ended.stderr.splitlines()[-1]
+    ended = forked(command("ground", *words))
+    assert ended.code == 1
+    assert file in ended.err.splitlines()[-1]
 
 
 CONTROLLED = ["emulate", "cubestar", "--tcp", "0", "--control", "0"]
