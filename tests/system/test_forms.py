@@ -6,9 +6,10 @@ from cubestack.firmware_model.interface.codec.switches import PROFILES
 from cubestack.firmware_model.mcu.inner_loops import loops_in_use
 from tests.system.forms import SENSORS, differs, observed, slow_form
 from tests.system.life import life, pair_life
+from tests.tiers import quick_ones
 
 
-@pytest.mark.parametrize("profile", PROFILES)
+@pytest.mark.parametrize("profile", quick_ones(PROFILES, "extended"))
 @pytest.mark.parametrize("name", SENSORS)
 def test_forms_are_equal(name: str, profile: str) -> None:
     fast, _ = observed(name, profile, 1)

@@ -247,7 +247,7 @@ def problem(status: int | None, said: str) -> str:
     return "" if len(lines) == 1 and lines[0].startswith("cubestack") else f"{len(lines)} lines"
 
 
-def try_all(count: int, seed: int) -> int:
+def try_all(count: int, seed: int, accepted_s: float = ACCEPTED_S) -> int:
     """Try ``count`` cases, 0 for all, and print the bad ones; returns their number."""
     ends = Counter[str]()
     with tempfile.TemporaryDirectory() as place:
@@ -255,7 +255,7 @@ def try_all(count: int, seed: int) -> int:
         make_files(folder)
         found = cases(folder)
         for one in random.Random(seed).sample(found, count) if count else found:
-            status, said = outcome(one.words, folder)
+            status, said = outcome(one.words, folder, accepted_s)
             wrong = problem(status, said)
             ends["bad" if wrong else "accepted" if status in (None, 0) else "refused"] += 1
             if wrong:

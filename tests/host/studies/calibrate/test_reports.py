@@ -1,4 +1,5 @@
 import json
+import shutil
 from collections.abc import Iterator
 from contextlib import nullcontext
 from dataclasses import replace
@@ -32,17 +33,23 @@ TRUE = Fisheye(322.5, 239.0, DISTORTION, codes.PIXELS_PER_DEGREE, 95.0)
 ANGLES = np.array([(a, b) for a in range(-60, 61, 24) for b in range(-50, 51, 20)], float)
 
 
-@pytest.fixture
-def lights(tmp_path: Path) -> Path:
-    """A folder with pictures of one light each, and angles.csv."""
+@pytest.fixture(scope="module")
+def pictures(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("lights")
     rows, columns = np.mgrid[:480, :640]
     lines = ["file,alpha_deg,beta_deg"]
     for number, (angles, (x, y)) in enumerate(zip(ANGLES, TRUE.project(ANGLES), strict=True)):
         spot = 30 + 200 * np.exp(-((columns - x) ** 2 + (rows - y) ** 2) / 18)
-        Image.fromarray(spot.astype(np.uint8)).save(tmp_path / f"{number}.png")
+        Image.fromarray(spot.astype(np.uint8)).save(folder / f"{number}.png")
         lines.append(f"{number}.png,{angles[0]},{angles[1]}")
-    (tmp_path / "angles.csv").write_text("\n".join(lines) + "\n", "utf-8")
-    return tmp_path
+    (folder / "angles.csv").write_text("\n".join(lines) + "\n", "utf-8")
+    return folder
+
+
+@pytest.fixture
+def lights(pictures: Path, tmp_path: Path) -> Path:
+    """A folder with pictures of one light each, and angles.csv."""
+    return shutil.copytree(pictures, tmp_path, dirs_exist_ok=True)
 
 
 def calibrated(folder: Path, **more: Any) -> list[cubesense.CalibrateResult]:
