@@ -83,11 +83,11 @@ def check(job: Job) -> None:
 
 
 @compiled
-def test_sample_of_short_rows_is_the_same_today() -> None:
+def test_a_short_row_is_the_same_today() -> None:
     stored = {name: load(record_file(DOCS, name)) for name in BUILT_IN}
     short = [job for job in JOBS if stored[job.device][job.key].seconds < 1]
-    for job in random.Random(DAY).sample(short, min(2, len(short))):
-        check(job)
+    if short:
+        check(random.Random(DAY).choice(short))
 
 
 @compiled

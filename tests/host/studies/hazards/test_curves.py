@@ -48,10 +48,16 @@ def test_hazard_curve_counts_one_image_per_camera_and_frame() -> None:
     assert (point.pictures, point.right) == (4, 4)
 
 
+JOBS = [Job("cubestar", "extended", "gradient", strength, 2, 4) for strength in (0.0, 60.0)]
+
+
+@pytest.mark.slow
 def test_points_do_not_depend_on_the_number_of_workers() -> None:
-    jobs = [Job("cubestar", "extended", "gradient", strength, 2, 4) for strength in (0.0, 60.0)]
-    alone = list(run_jobs(jobs, 1))
-    assert alone == list(run_jobs(jobs, 2))
+    assert list(run_jobs(JOBS, 1)) == list(run_jobs(JOBS, 2))
+
+
+def test_points_count_all_frames() -> None:
+    alone = list(run_jobs(JOBS, 1))
     assert [point.strength for point in alone] == [0.0, 60.0]
     assert all(point.right + point.refused + point.wrong == 2 for point in alone)
     assert alone[0].right == 2
