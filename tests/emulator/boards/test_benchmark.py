@@ -13,6 +13,7 @@ from cubestack.emulator.native.compiler import find_compiler
 from cubestack.emulator.rtl.benchmark import cold_build_s
 from cubestack.firmware_model.interface.cameras.mlx75412 import LINE_CLOCKS
 from cubestack.firmware_model.interface.cameras.ov7620 import PIXEL_CLOCK_HZ
+from tests.tiers import quick_ones
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
 
@@ -41,7 +42,7 @@ def test_benchmark_run_stores_a_frame():
     assert (engine.get_pin("ACK"), engine.now_ps) == (1, ends)
 
 
-@pytest.mark.parametrize("way", pair.STORES)
+@pytest.mark.parametrize("way", quick_ones(pair.STORES, "both"))
 def test_benchmark_pair_stores_end_with_the_frame(way):
     engine = pair.pair_with_cameras()
     assert 0 < pair.pair_store_ms(engine, way, 2) < float("inf")

@@ -51,6 +51,7 @@ def test_remote_bus_files_have_independent_addresses(remote):
     assert remote.ask(second, i2c_socket.Call.READ, i2c_socket.pack_read(2)) == (-errno.ENXIO, b"")
 
 
+@pytest.mark.slow
 def test_remote_bus_transfers_the_largest_messages_in_both_directions(remote, registers):
     registers.i2c_write = lambda _byte: True
     file = remote.bus.open()

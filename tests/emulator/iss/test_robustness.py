@@ -9,6 +9,7 @@ from cubestack.emulator.iss.insight.fault_report import last_fault
 from cubestack.emulator.iss.machine import EXTERNAL_BASE, Machine
 from cubestack.emulator.iss.outcome import OutgoingKind, StopReason
 from cubestack.firmware_model.interface.efm32gg import LAYOUTS
+from tests.tiers import quick
 
 from .armv7m.thumb import Program
 from .efm32gg.bench import MS, US, WFI, Bench, S, asleep
@@ -29,7 +30,7 @@ def fuzz() -> Fuzz:
 
 
 @pytest.mark.parametrize("kind", CASES)
-@pytest.mark.parametrize("part", range(4))
+@pytest.mark.parametrize("part", quick(range(4), 2))
 def test_random_cases_run_to_their_time(fuzz: Fuzz, kind: str, part: int) -> None:
     for number in range(part, EACH, 4):
         CASES[kind](fuzz, number)

@@ -145,7 +145,7 @@ def axis_shares(
 
 
 @pytest.mark.parametrize("noise", quick([3e-5, 1e-3], 1))
-@pytest.mark.parametrize("count", quick([3, 5, 15, 9], 2))
+@pytest.mark.parametrize("count", quick([3, 5, 15], 1))
 def test_sigmas_hold_per_axis(count: int, noise: float) -> None:
     hold(*axis_shares(count, noise, [count, round(1e6 * noise)]), high=0.78)
 

@@ -53,6 +53,11 @@ def stored(camera: Camera, sram: Sram) -> CaptureResult:
     return CaptureResult.STORED_OWN_SRAM if own else CaptureResult.STORED_OTHER_SRAM
 
 
+CAMERA_LINES = {
+    line: camera for lines in (pins.CAMERA_SCL, pins.CAMERA_SDA) for camera, line in lines.items()
+}
+
+
 class SccbCamera:
     """A camera's registers behind its two lines."""
 
@@ -196,10 +201,11 @@ class Harness(Runner, HostSide):
 
     def set_pin(self, pin: str, level: int) -> None:
         was, self.pins[pin] = self.pins.get(pin), level
+        if (of := CAMERA_LINES.get(pin)) is not None:  # nearly all calls
+            if self.pins.get(pins.CAMERA_POWER[of]):
+                self.cameras[of].set(pin[-3:], level, self.now_ns)
+            return
         for camera in Camera:
-            powered = self.pins.get(pins.CAMERA_POWER[camera])
-            if pin in (pins.CAMERA_SCL[camera], pins.CAMERA_SDA[camera]) and powered:
-                self.cameras[camera].set(pin[-3:], level, self.now_ns)
             if pin == pins.CAMERA_POWER[camera] and was != level:
                 self.cameras[camera].power_up()
         for sram in Sram:

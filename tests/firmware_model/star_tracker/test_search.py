@@ -45,7 +45,7 @@ def test_search_solves_nearly_all_skies_and_is_never_wrong(
 
 def test_hint_in_the_opposite_direction_identifies_nothing(tracker: Tracker) -> None:
     rng = np.random.default_rng(50)
-    for _ in range(8):
+    for _ in range(4):
         sky = tracker.sky(rng)
         found = tracker.identify(sky.directions, hint=-sky.boresight.astype(np.float32))
         assert found.outcome != "IDENTIFIED"
@@ -61,12 +61,12 @@ def test_false_stars_are_not_identified(tracker: Tracker, count: int) -> None:
 def test_rejects_mirrored_sky(tracker: Tracker) -> None:
     rng = np.random.default_rng(70)
     outcomes = []
-    for _ in range(4):
+    for _ in range(3):
         found = tracker.identify(tracker.sky(rng).directions * MIRROR)
         assert (found.stars == -1).all()
         outcomes.append(found.outcome)
     expected = "MIRRORED" if isinstance(tracker, PairTracker) else "UNCONFIRMED"
-    assert outcomes.count(expected) >= 3
+    assert outcomes.count(expected) >= 2
 
 
 def test_rejects_too_few_stars(tracker: Tracker) -> None:
@@ -86,7 +86,7 @@ def test_false_stars_never_change_an_identity(tracker: Tracker) -> None:
         assert (real[named] == stars[named]).all()
 
 
-@pytest.mark.parametrize("scale", quick([0.97, 0.995, 1.01, 1.03], 2))
+@pytest.mark.parametrize("scale", quick([0.97, 0.995, 1.01, 1.03], 1))
 def test_identification_measures_the_focal_length_error(tracker: Tracker, scale: float) -> None:
     rng = np.random.default_rng(83)
     solved = 0

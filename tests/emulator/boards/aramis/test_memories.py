@@ -8,9 +8,10 @@ from cubestack.emulator.boards.aramis.memories import flash_with
 from cubestack.firmware_model.aramis.catalogue.flash_store import flash_image
 from cubestack.firmware_model.aramis.hardware import FLASH_BYTES, SDRAM_BYTES
 from tests.emulator.boards.aramis.conftest import catalogue, scene
+from tests.tiers import quick
 
 
-@pytest.mark.parametrize("seed", [0, 5])
+@pytest.mark.parametrize("seed", quick([0, 5], 1))
 def test_sdram_and_the_numbers_after_it_are_those_of_the_seed(seed: int) -> None:
     rng = np.random.default_rng([seed, *AramisBoard.random_stream])
     wanted = rng.integers(1 << 32, size=SDRAM_BYTES // 4, dtype="<u4").view(np.uint8)

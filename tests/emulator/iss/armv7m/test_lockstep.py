@@ -175,7 +175,7 @@ def _compile(*arguments: str | Path) -> None:
 
 
 @needs_compiler
-@pytest.mark.parametrize(("name", "optimization"), quick(CASES, 5))
+@pytest.mark.parametrize(("name", "optimization"), quick(CASES, 3))
 def test_program_ends_as_on_unicorn(
     name: str, optimization: str, support: Path, tmp_path: Path
 ) -> None:

@@ -15,6 +15,7 @@ from cubestack.firmware_model.interface.efm32gg.table import (
     peripheral,
 )
 from tests.emulator.iss.cross_compiler import compile_for_m3, needs_compiler
+from tests.tiers import DAY
 from tests.together import together
 
 from .bench import Bench
@@ -41,7 +42,8 @@ def test_reset_values_are_those_of_the_table(layout: Layout, instance: Instance)
 
 @together(("layout", "instance"), UNITS, ids=lambda one: one.name)
 def test_reserved_bits_read_0(layout: Layout, instance: Instance) -> None:
-    for register in layout.registers:
+    """Of every third register, on another day of the others."""
+    for register in layout.registers[DAY % 3 :: 3]:
         bench = Bench()
         bench["CMU.HFPERCLKEN0"] = bench["CMU.HFCORECLKEN0"] = 0xFFFF_FFFF
         bench.machine.write(instance.base + register.offset, 0xFFFF_FFFF)

@@ -170,6 +170,7 @@ def test_backup_uart_ignores_noise_and_incomplete_messages(unit: Harness) -> Non
     assert said(unit, READ, THRESHOLD) == bytes([WRITE])
 
 
+@pytest.mark.slow
 def test_backup_uart_sends_the_image_until_another_message(unit: Harness) -> None:
     rng = np.random.default_rng(1)
     for sram in codes.Sram:
