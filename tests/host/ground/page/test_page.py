@@ -1,3 +1,4 @@
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -119,43 +120,9 @@ def test_zoomed_plot_stays_while_values_arrive(page: Any) -> None:
     assert latest() != held
 
 
-def test_command_changes_the_device(page: Any) -> None:
-    page.select_option("#frame", "DetectionThresholdValues")
-    page.select_option("#command", "setDetectionThresholds")
-    page.fill("[name=DetectionThreshold]", "33")
-    page.fill("[name=StarThreshold]", "34")
-    page.click("#send")
-    page.wait_for_function("() => document.querySelector('#telemetry').innerText.includes('33')")
-    page.check("[title='plot DetectionThreshold']")
-    page.wait_for_selector("#plot canvas")
-
-
-def test_errors_are_shown_as_text(page: Any) -> None:
-    told = line(page, "read <img/src=x/onerror=document.hacked=1>")
-    assert "<img" in told
-    assert page.locator("#lines li.bad").count() == 1
-    assert page.evaluate("document.hacked") is None
-    assert page.locator("#lines img").count() == 0
-
-
 def seconds(page: Any) -> float:
     """The time that a page shows."""
     return float(page.inner_text("#time").split()[0])
-
-
-def test_time_is_paused_stepped_and_resumed(page: Any) -> None:
-    page.click("#pause")
-    page.wait_for_selector("#pause[aria-pressed=true]")
-    page.click("#step")
-    page.wait_for_selector("#lines li.good >> text=step")
-    to_s = round(seconds(page)) + 50
-    page.fill("#to", str(to_s))
-    page.click("#go")
-    page.wait_for_function(
-        f"() => document.querySelector('#time').textContent.startsWith('{to_s}.0')"
-    )
-    page.click("#pause")
-    page.wait_for_selector("#pause[aria-pressed=false]")
 
 
 @pytest.mark.slow
@@ -220,14 +187,6 @@ def test_time_goes_back_while_the_emulation_does_not_answer(page: Any) -> None:
 
     lives(page, change)
     page.wait_for_selector("#summary >> text=/Time went back/")
-
-
-def test_fault_is_injected_and_logged(page: Any) -> None:
-    faults = page.locator("#fault option").all_inner_texts()
-    reset = next(fault for fault in faults if fault.startswith("processor-reset "))
-    page.select_option("#fault", reset)
-    page.click("#inject")
-    page.wait_for_selector(f"#lines li >> text=/ s {reset}: /")
 
 
 def test_two_tabs_share_the_state_and_show_different_targets(
@@ -369,3 +328,55 @@ def test_paused_display_holds_its_values(chromium: Any, address: str, page: Any)
     page.wait_for_function(
         "(held) => parseFloat(document.querySelector('#time').textContent) > held + 2.2", arg=held
     )
+
+
+# --- on one page, one after the other -------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def kept(chromium: Any, address: str) -> Iterator[Any]:
+    with shown(chromium, address) as opened:
+        look(opened, "CubeStar")
+        yield opened
+
+
+def test_command_changes_the_device(kept: Any) -> None:
+    kept.select_option("#frame", "DetectionThresholdValues")
+    kept.select_option("#command", "setDetectionThresholds")
+    kept.fill("[name=DetectionThreshold]", "33")
+    kept.fill("[name=StarThreshold]", "34")
+    kept.click("#send")
+    kept.wait_for_function("() => document.querySelector('#telemetry').innerText.includes('33')")
+    kept.check("[title='plot DetectionThreshold']")
+    kept.wait_for_selector("#plot canvas")
+
+
+def test_errors_are_shown_as_text(kept: Any) -> None:
+    told = line(kept, "read <img/src=x/onerror=document.hacked=1>")
+    assert "<img" in told
+    assert kept.locator("#lines li.bad").count() == 1
+    assert kept.evaluate("document.hacked") is None
+    assert kept.locator("#lines img").count() == 0
+
+
+def test_fault_is_injected_and_logged(kept: Any) -> None:
+    faults = kept.locator("#fault option").all_inner_texts()
+    reset = next(fault for fault in faults if fault.startswith("processor-reset "))
+    kept.select_option("#fault", reset)
+    kept.click("#inject")
+    kept.wait_for_selector(f"#lines li >> text=/ s {reset}: /")
+
+
+def test_time_is_paused_stepped_and_resumed(kept: Any) -> None:
+    kept.click("#pause")
+    kept.wait_for_selector("#pause[aria-pressed=true]")
+    kept.click("#step")
+    kept.wait_for_selector("#lines li.good >> text=step")
+    to_s = round(seconds(kept)) + 50
+    kept.fill("#to", str(to_s))
+    kept.click("#go")
+    kept.wait_for_function(
+        f"() => document.querySelector('#time').textContent.startsWith('{to_s}.0')"
+    )
+    kept.click("#pause")
+    kept.wait_for_selector("#pause[aria-pressed=false]")
