@@ -11,7 +11,7 @@ ground's reports.
 
 import hashlib
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, Self
 
 import numpy as np
@@ -149,15 +149,9 @@ class StarCatalogue:
     def sha256(self) -> str:
         return hashlib.sha256(self.to_bytes()).hexdigest()
 
-    def with_pair_limit(self, pair_limit_deg: float) -> Self:
+    def with_pair_limit(self, pair_limit_deg: float) -> "StarCatalogue":
         """This catalogue with a narrower pair list: the beginning of its own, which is sorted."""
-        count = int(np.searchsorted(self.pairs.angle, np.float32(np.radians(pair_limit_deg))))
-        first, second, angle = self.pairs.first, self.pairs.second, self.pairs.angle
-        return replace(
-            self,
-            pairs=PairList(first[:count], second[:count], angle[:count]),
-            pair_limit_deg=min(pair_limit_deg, self.pair_limit_deg),
-        )
+        return _narrowed(self, pair_limit_deg)
 
     def near(
         self, boresight: NDArray[np.float32], radius_deg: float, meter: Meter
@@ -235,4 +229,15 @@ def _list_pairs(vectors: NDArray[np.float64], limit_rad: float) -> PairList:
     order = np.argsort(stored, kind="stable")
     return PairList(
         first[close][order].astype(np.uint16), second[close][order].astype(np.uint16), stored[order]
+    )
+
+
+@lru_cache(maxsize=8)  # each image asks for the same one
+def _narrowed(whole: StarCatalogue, pair_limit_deg: float) -> StarCatalogue:
+    count = int(np.searchsorted(whole.pairs.angle, np.float32(np.radians(pair_limit_deg))))
+    first, second, angle = whole.pairs.first, whole.pairs.second, whole.pairs.angle
+    return replace(
+        whole,
+        pairs=PairList(first[:count], second[:count], angle[:count]),
+        pair_limit_deg=min(pair_limit_deg, whole.pair_limit_deg),
     )
