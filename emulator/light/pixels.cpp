@@ -1,8 +1,9 @@
 // Grey values of an image sensor: pixels.py, one row at a time.
 //
 // Every operation is that of the reference, in its order and precision: no fused multiplication, no
-// other association. So the result is equal to the bit. Where pixels are alike, the grey values of
-// most that have little light are known from their random numbers, and are taken from a table.
+// other association. So the result is equal to the bit. Most pixels need none: where they are
+// alike, a table has the grey values of little light by their random numbers; where they are not, a
+// bound tells that all of a segment are 0.
 
 #include <algorithm>
 #include <cmath>
@@ -23,12 +24,15 @@ struct PixelModel {
     float dark, shot, steady, black, offset, full_scale, step;
     float dim;  // light up to which the table holds
     const uint8_t *dim_values;  // by the highest bits of a pixel's number; none: not known
+    const float *most_response, *most_dark_share, *most_pattern;  // of each segment, or none
+    float most_gain;
     light::NoiseSource noise;
 };
 
 constexpr int SEGMENT = 16;  // pixels of a row that are computed together, or taken from the table
 constexpr int TABLE_BITS = 14;
 constexpr uint8_t UNKNOWN = 255;
+constexpr float ROUNDING = 1e-3f;  // more than the noise's function differs where pieces meet
 
 // Pixels of row ``y`` from column ``first`` up to ``end``; ``start`` is the place of the row's first.
 struct Span {
@@ -40,9 +44,11 @@ struct Span {
 struct Row {
     explicit Row(int columns)
         : charge(columns), signal(columns), numbers(columns + 2 * light::NUMBERS_OF_BLOCK),
+          brightest(columns / SEGMENT), loudest(columns / SEGMENT),
           computed(columns / SEGMENT + 1) {}
     std::vector<float> charge, signal, means;
     std::vector<uint32_t> numbers;
+    std::vector<float> brightest, loudest;  // of each segment: light, and noise
     std::vector<uint8_t> computed;
     std::vector<Span> spans;
 };
@@ -148,6 +154,44 @@ void look_up(const PixelModel &model, int64_t start, const uint32_t *__restrict 
     }
 }
 
+// Largest noise of a segment, at least 0. Numbers below 2^31 are noise above 0, the larger the lower
+// they are.
+float loudest(const light::NoiseSource &noise, const uint32_t *numbers) {
+    constexpr uint32_t HALF = 1u << 31;  // with it inverted, numbers are in order as signed ones
+    int32_t least = 0;
+    for (int x = 0; x < SEGMENT; ++x) {
+        const int32_t number = (int32_t)(numbers[x] ^ HALF);
+        least = number < least ? number : least;
+    }
+    return least < 0 ? light::normal(noise, (uint32_t)least ^ HALF) + ROUNDING : 0.0f;
+}
+
+// Tells the segments of the row that begins at ``start`` in which a pixel may be above 0; ``grey`` of
+// the others becomes 0.
+//
+// The bound has a pixel's operations in their order, each of which grows with its operands.
+void find_black(const PixelModel &model, int64_t start, const uint32_t *numbers, uint8_t *grey,
+                Row &row) {
+    const int segments = model.columns / SEGMENT;
+    for (int n = 0; n < segments; ++n) {
+        row.brightest[n] = brightest(model.light + start + n * SEGMENT);
+        row.loudest[n] = loudest(model.noise, numbers + n * SEGMENT);
+    }
+    const float *__restrict light = row.brightest.data(), *__restrict noise = row.loudest.data();
+    const float *__restrict response = model.most_response + start / SEGMENT;
+    const float *__restrict dark_share = model.most_dark_share + start / SEGMENT;
+    const float *__restrict pattern = model.most_pattern + start / SEGMENT;
+    uint8_t *__restrict computed = row.computed.data();
+    for (int n = 0; n < segments; ++n) {
+        const float charge = light[n] * response[n] + dark_share[n] * model.dark;
+        const float signal = noise[n] * std::sqrt(charge * model.shot + model.steady) + charge;
+        const float above = signal - model.black > 0.0f ? signal - model.black : 0.0f;
+        const float value = above * model.most_gain + pattern[n] + model.offset + 0.5f;
+        computed[n] = !(value * model.step < 1.0f);
+    }
+    std::memset(grey, 0, model.columns);
+}
+
 void mark_special(int64_t start, const Places &hot, const Places &repaired, uint8_t *computed) {
     for (int64_t n = hot.first; n < hot.end; ++n) computed[(hot.places[n] - start) / SEGMENT] = 1;
     for (int64_t n = repaired.first; n < repaired.end; ++n)
@@ -186,6 +230,8 @@ extern "C" void light_grey_values(const PixelModel *model, int32_t first, int32_
         uint8_t *computed = row.computed.data();
         if (model->dim_values)
             look_up(*model, start, numbers, grey, computed);
+        else if (model->most_pattern)
+            find_black(*model, start, numbers, grey, row);
         else
             std::memset(computed, 1, row.computed.size());
         mark_special(start, hot, repaired, computed);

@@ -10,6 +10,7 @@ import itertools
 import math
 from dataclasses import dataclass, field
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +41,20 @@ NOWHERE: Places = np.zeros(0, np.int64)
 NO_CHARGE: Light = np.zeros(0, np.float32)
 
 
+class Most(NamedTuple):
+    """Largest value of each field in each segment, (rows, segments)."""
+
+    response: Light
+    dark_share: Light
+    pattern: Light
+
+    @classmethod
+    def of(cls, response: Light, dark_share: Light, pattern: Light) -> "Most":
+        """Of fields (rows, columns) with whole segments."""
+        fields = response, dark_share, pattern
+        return cls(*(one.reshape(len(one), -1, SEGMENT).max(axis=2) for one in fields))
+
+
 @dataclass(frozen=True, eq=False)
 class PixelModel:
     """An image sensor in one frame. Fields have the shape (rows, columns), places are flat.
@@ -68,6 +83,7 @@ class PixelModel:
     full_scale: int = 255
     step: float = 1.0
     stuck: Places = field(default_factory=NOWHERE.view)  #: pixels at 255
+    most: Most | None = None  #: of the fields; None: not known, which takes longer
 
 
 def grey_values(light: Light, model: PixelModel) -> Grey:
@@ -117,6 +133,8 @@ class ModelRecord(ctypes.Structure):
         *((name, ctypes.c_float) for name in ("dark", "shot", "steady", "black", "offset")),
         *((name, ctypes.c_float) for name in ("full_scale", "step", "dim")),
         ("dim_values", ctypes.c_void_p),
+        *((f"most_{name}", ctypes.c_void_p) for name in Most._fields),
+        ("most_gain", ctypes.c_float),
         ("noise", NoiseRecord),
     )
 
@@ -129,6 +147,7 @@ def compiled(
     columns = light.shape[1]
     gains = _gains(model, columns)
     in_segments = model.noise is not None and columns % SEGMENT == 0
+    most = model.most._asdict() if model.most is not None and in_segments else {}
     fields = {
         "light": light,
         "response": model.response,
@@ -139,6 +158,7 @@ def compiled(
         "hot_charge": model.hot_charge,
         "repaired": model.repaired,
         "dim_values": _dim_values_of(model, gains) if in_segments else None,
+        **{f"most_{name}": one for name, one in most.items()},
     }
     # Kept until the call has ended.
     kept = {n: None if one is None else np.ascontiguousarray(one) for n, one in fields.items()}
@@ -157,6 +177,7 @@ def compiled(
         full_scale=model.full_scale,
         step=model.step,
         dim=_dim_light(model),
+        most_gain=gains.max(),
         noise=noise_of(model.noise),
     )
     grey = np.empty((end - first, columns), np.uint8)

@@ -232,7 +232,7 @@ def _list_pairs(vectors: NDArray[np.float64], limit_rad: float) -> PairList:
     )
 
 
-@lru_cache(maxsize=8)  # each image asks for the same one
+@lru_cache(maxsize=8)  # each image needs the same one
 def _narrowed(whole: StarCatalogue, pair_limit_deg: float) -> StarCatalogue:
     count = int(np.searchsorted(whole.pairs.angle, np.float32(np.radians(pair_limit_deg))))
     first, second, angle = whole.pairs.first, whole.pairs.second, whole.pairs.angle

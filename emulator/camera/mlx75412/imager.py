@@ -20,7 +20,7 @@ from cubestack.emulator.camera.common.imager import Imager
 from cubestack.emulator.camera.common.view import SkyCondition
 from cubestack.emulator.camera.mlx75412.remap import Remap, remapped
 from cubestack.emulator.light.noise import FrameNoise
-from cubestack.emulator.light.pixels import NOWHERE, Grey, Light, PixelModel
+from cubestack.emulator.light.pixels import NOWHERE, Grey, Light, Most, PixelModel
 from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
 
 ELECTRONS_PER_DN12 = 2.28  # per count of 12 bits (published)
@@ -81,6 +81,10 @@ class Mlx75412Imager(Imager[Corrections]):
         self._hot_share = generator.exponential(size=FACTORY_HOT).astype(np.float32)
         for array in vars(self).values():
             array.flags.writeable = False
+        self._most = {
+            corrected: Most.of(self._gain, self._dark_share, pattern)
+            for corrected, pattern in ((False, self._pattern), (True, self._pattern_left))
+        }
 
     def electrons_per_count(self, settings: Corrections) -> float:
         del settings
@@ -132,6 +136,7 @@ class Mlx75412Imager(Imager[Corrections]):
             pattern=self._pattern_left if settings.fixed_pattern else self._pattern,
             black=dark if settings.dark else 0.0,
             repaired=self._defects if settings.defects else NOWHERE,
+            most=self._most[settings.fixed_pattern],
         )
 
 

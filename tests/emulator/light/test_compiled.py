@@ -11,7 +11,7 @@ from cubestack.emulator.light import globe, library, pixels, spots
 from cubestack.emulator.light.distortion import Brown
 from cubestack.emulator.light.lens_curve import LensCurve
 from cubestack.emulator.light.noise import FrameNoise
-from cubestack.emulator.light.pixels import PixelModel
+from cubestack.emulator.light.pixels import Most, PixelModel
 from cubestack.emulator.native import compiler
 from cubestack.emulator.native.cache import collected
 from cubestack.emulator.native.compiler import find_compiler
@@ -102,6 +102,41 @@ def test_grey_values_of_a_dark_sky_are_equal(
         step=step,
     )
     expected = pixels.reference(light, model)
+    np.testing.assert_array_equal(pixels.compiled(library.light_library(), light, model), expected)
+
+
+@needs_compiler
+@together("odd", [*Most._fields, "gain"])
+@together("black", [0.0, 20.0])
+@together("dark", [1.0, 20.0])
+def test_black_segments_are_equal(dark: float, black: float, odd: str) -> None:
+    """A few pixels differ much from the others, so that a bound of those is wrong there."""
+    shape = (301, 1008)  # whole segments
+    rng = np.random.default_rng(7)
+    light = np.where(rng.random(shape) < 0.05, rng.exponential(60, shape), 0).astype(np.float32)
+    light = np.where(rng.random(shape) < 0.01, 40 * light, light)
+    light[:, 500:] = 0
+    fields = {name: np.full(shape, name != "pattern", np.float32) for name in Most._fields}
+    fields["gain"] = np.full((2, shape[1]), 0.4, np.float32)
+    differing = rng.choice(fields[odd].size, fields[odd].size // 300)
+    fields[odd].reshape(-1)[differing] = rng.choice([-3, 8], len(differing))
+    if odd != "pattern":
+        np.abs(fields[odd], out=fields[odd])
+    most = Most.of(*(fields[name] for name in Most._fields))
+    model = PixelModel(
+        **fields,
+        most=most,
+        noise=FrameNoise([7]),
+        dark=dark,
+        black=black,
+        steady=100.0,
+        full_scale=4095,
+        step=1 / 16,
+        hot=np.sort(rng.choice(light.size, 200)),
+        hot_charge=np.full(200, 500, np.float32),
+    )
+    expected = pixels.reference(light, model)
+    assert 100 < np.count_nonzero(expected) < light.size / 5
     np.testing.assert_array_equal(pixels.compiled(library.light_library(), light, model), expected)
 
 
