@@ -3,7 +3,7 @@
 // Every operation is that of the reference, in its order and precision: no fused multiplication, no
 // other association. So the result is equal to the bit. Most pixels need none: where they are
 // alike, a table has the grey values of little light by their random numbers; where they are not, a
-// bound tells that all of a segment are 0.
+// bound shows that all of a segment are 0.
 
 #include <algorithm>
 #include <cmath>
@@ -140,7 +140,7 @@ float brightest(const float *light) {
     return found;
 }
 
-// Takes ``grey`` from the table, and tells the segments of the row in which that is not enough: a
+// Takes ``grey`` from the table, and marks the segments of the row in which that is not enough: a
 // pixel has more than dim light, or a number with several values.
 void look_up(const PixelModel &model, int64_t start, const uint32_t *__restrict numbers,
              uint8_t *__restrict grey, uint8_t *__restrict computed) {
@@ -166,7 +166,7 @@ float loudest(const light::NoiseSource &noise, const uint32_t *numbers) {
     return least < 0 ? light::normal(noise, (uint32_t)least ^ HALF) + ROUNDING : 0.0f;
 }
 
-// Tells the segments of the row that begins at ``start`` in which a pixel may be above 0; ``grey`` of
+// Marks the segments of the row that begins at ``start`` in which a pixel may be above 0; ``grey`` of
 // the others becomes 0.
 //
 // The bound has a pixel's operations in their order, each of which grows with its operands.

@@ -52,7 +52,10 @@ class Most(NamedTuple):
     def of(cls, response: Light, dark_share: Light, pattern: Light) -> "Most":
         """Of fields (rows, columns) with whole segments."""
         fields = response, dark_share, pattern
-        return cls(*(one.reshape(len(one), -1, SEGMENT).max(axis=2) for one in fields))
+        found = [one.reshape(len(one), -1, SEGMENT).max(axis=2) for one in fields]
+        for one in found:
+            one.flags.writeable = False
+        return cls(*found)
 
 
 @dataclass(frozen=True, eq=False)

@@ -81,10 +81,8 @@ class Mlx75412Imager(Imager[Corrections]):
         self._hot_share = generator.exponential(size=FACTORY_HOT).astype(np.float32)
         for array in vars(self).values():
             array.flags.writeable = False
-        self._most = {
-            corrected: Most.of(self._gain, self._dark_share, pattern)
-            for corrected, pattern in ((False, self._pattern), (True, self._pattern_left))
-        }
+        self._most = Most.of(self._gain, self._dark_share, self._pattern)
+        self._most_left = Most.of(self._gain, self._dark_share, self._pattern_left)
 
     def electrons_per_count(self, settings: Corrections) -> float:
         del settings
@@ -136,7 +134,7 @@ class Mlx75412Imager(Imager[Corrections]):
             pattern=self._pattern_left if settings.fixed_pattern else self._pattern,
             black=dark if settings.dark else 0.0,
             repaired=self._defects if settings.defects else NOWHERE,
-            most=self._most[settings.fixed_pattern],
+            most=self._most_left if settings.fixed_pattern else self._most,
         )
 
 
