@@ -103,7 +103,7 @@ def tiles(name):
     return count_tiles(DESIGNS[name].make())
 
 
-@pytest.mark.parametrize(("name", "design", "file"), quick(ROWS, 2))
+@pytest.mark.parametrize(("name", "design", "file"), quick(ROWS, 1))
 def test_design_areas_equal_the_recorded_ones(name, design, file):
     flow_checks.area_is_as_recorded(name, design, file)
 

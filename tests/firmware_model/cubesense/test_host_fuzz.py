@@ -130,7 +130,7 @@ def test_random_bytes_on_every_bus_do_not_harm_the_node(seed: int, mcu_addressin
     stays_sane(unit)
 
 
-@pytest.mark.parametrize(("seed", "seconds"), quick([(0, 3), (1, 15)], 1))
+@pytest.mark.parametrize(("seed", "seconds"), quick([(0, 3), (1, 10)], 1))
 def test_random_bytes_during_any_operation_do_not_harm_the_node(seed: int, seconds: int) -> None:
     """Interrupts come at every request of the program, not only where it sleeps."""
     unit = Harness()

@@ -74,7 +74,7 @@ BUGS = {
 }
 
 
-@pytest.mark.parametrize("name", quick_ones(BUGS, "tri-state contention"))
+@pytest.mark.parametrize("name", quick_ones(BUGS, "metastable crossing"))
 def test_planted_bug_in_a_foreign_design_is_found(name: str, tmp_path: Path) -> None:
     bug = BUGS[name]
     right = (DESIGNS / bug.design).read_text(encoding="utf-8")
@@ -114,11 +114,14 @@ def test_foreign_design_is_proved(name: str) -> None:
     assert all(verdict.proved for verdict in prove_contract(design, chosen))
 
 
-def test_shipped_design_is_proved_and_has_no_crossing() -> None:
-    design = Design(CONTRACT)
-    chosen = {key: CONTRACT.properties[key] for key in SHORT}
-    assert all(verdict.proved for verdict in prove_contract(design, chosen))
-    assert not crossings(design)
+@pytest.mark.parametrize("key", quick_ones(SHORT, "no-write-while-reading"))
+def test_shipped_design_is_proved(key: str) -> None:
+    (verdict,) = prove_contract(Design(CONTRACT), {key: CONTRACT.properties[key]})
+    assert verdict.proved
+
+
+def test_shipped_design_has_no_crossing() -> None:
+    assert not crossings(Design(CONTRACT))
 
 
 @pytest.mark.parametrize("side", quick(["sun", "nadir"], 1))

@@ -111,6 +111,7 @@ def test_failure_has_its_requirement_and_a_waveform(
     assert failure.text == CONTRACT.checks[failed.name].requirement
 
 
+@pytest.mark.slow
 def test_design_that_hangs_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     head, tail = SHIPPED.verilog(Size(8, 4)).split("module dut(", 1)
     loop = "reg r = 0; always @(posedge PIXCLK) forever r = ~r;\nendmodule"
