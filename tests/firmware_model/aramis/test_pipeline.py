@@ -156,9 +156,11 @@ def test_solving_reports_phases_and_leaves_the_image_unchanged() -> None:
 Y, X = np.mgrid[: FIELD.rows, : FIELD.columns]
 
 
+NOISE = np.random.default_rng(0).normal(0, 1.5, Y.shape)
+
+
 def noisy(level: object) -> NDArray[np.uint8]:
-    image = np.random.default_rng(0).normal(0, 1.5, Y.shape) + level
-    return np.clip(np.rint(image), 0, 255).astype(np.uint8)
+    return np.clip(np.rint(NOISE + level), 0, 255).astype(np.uint8)
 
 
 def reason(image: NDArray[np.uint8], configuration: Configuration = VERIFIED) -> Reason:

@@ -1,5 +1,6 @@
 """Spots, and streaks of known length, drawn by sweeping a spot."""
 
+from functools import cache
 from itertools import product
 from typing import Any
 
@@ -25,6 +26,11 @@ NOISE = 1.5
 Y, X = np.mgrid[: FIELD.rows, : FIELD.columns]
 
 
+@cache
+def noise(seed: int) -> NDArray[np.float64]:
+    return np.random.default_rng(seed).normal(0, NOISE, Y.shape)
+
+
 def spots(
     places: NDArray[np.float64],
     light: float,
@@ -32,7 +38,7 @@ def spots(
     level: object = 6.0,
     seed: int = 0,
 ) -> NDArray[np.uint8]:
-    image = np.random.default_rng(seed).normal(0, NOISE, Y.shape) + level
+    image = noise(seed) + level
     for x, y in places:
         part = np.s_[int(y) - 40 : int(y) + 41, int(x) - 40 : int(x) + 41]
         square = (X[part] - x) ** 2 + (Y[part] - y) ** 2
