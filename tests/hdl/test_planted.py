@@ -216,6 +216,7 @@ def test_documentation_lists_every_planted_bug() -> None:
     assert section.startswith("\n".join([*rows, "\n"]))
 
 
+@pytest.mark.slow
 def test_planting_a_bug_leaves_the_design_unchanged() -> None:
     before = verilog_text(TIERS[STAR].make(), "dut")
     wrong_verilog(BUGS[0], STAR)

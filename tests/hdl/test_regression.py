@@ -37,6 +37,7 @@ def moments(results: Path) -> dict[str, str]:
     }
 
 
+@pytest.mark.slow
 def test_same_seed_repeats_the_simulation(verilog: Path, tmp_path: Path) -> None:
     """To the picosecond, where every moment is random."""
     runner = build(verilog, tmp_path / "build")
@@ -74,6 +75,7 @@ def test_reports_compile_errors(tmp_path: Path) -> None:
     assert "syntax error" in outcome.log
 
 
+@pytest.mark.slow
 def test_hanging_simulation_is_terminated(verilog: Path, tmp_path: Path) -> None:
     text = verilog.read_text(encoding="utf-8")
     loop = "reg loop = 0;\n  always @(posedge PIXCLK) forever loop = ~loop;\n"

@@ -116,6 +116,7 @@ def texts():
     return [text(CubeStarTop(8, 4), "cubestar") for text in TEXTS]
 
 
+@pytest.mark.slow
 def test_generated_text_is_reproducible_across_processes(texts):
     program = (
         "import json\nfrom cubestack.hdl.flow.generate import *\n"

@@ -247,6 +247,7 @@ def test_rfc2217_purge_discards_bytes_not_yet_on_the_wire(port, device, connect)
     assert 0 < len(device.received) < 50
 
 
+@pytest.mark.slow
 def test_rfc2217_request_flood_without_reads_keeps_replies_bounded(port, device, connect):
     client = connect()
     client.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)

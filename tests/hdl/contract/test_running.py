@@ -72,6 +72,7 @@ def test_tiers_and_sizes() -> None:
     assert {run.seed for run in full} == {6, 7, 8}
 
 
+@pytest.mark.slow
 @needs_yosys
 def test_design_without_parameters_is_tested_at_full_size(tmp_path: Path) -> None:
     """Whole frames in the Verilog harness, the rest in Python."""

@@ -64,6 +64,7 @@ def test_documentation_lists_every_coverage_group() -> None:
         assert f"| {name} | {len(group.points())} | {group.meaning} |" in text
 
 
+@pytest.mark.slow
 def test_regression_that_misses_a_point_fails(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider"]
     done = subprocess.run(

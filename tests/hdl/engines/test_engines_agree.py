@@ -100,6 +100,7 @@ def test_random_events_cover_acknowledges_memories_and_outputs(case):
     assert still <= {case.wiring.contention}
 
 
+@pytest.mark.slow
 def test_a_fault_in_the_simulated_engine_and_in_icarus_is_found(case, tmp_path):
     """The same pins, and a picture one column less wide."""
     wiring, events = BOARDS[case.name].wiring(True), case.some_events()

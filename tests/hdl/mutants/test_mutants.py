@@ -65,6 +65,7 @@ def test_rejects_too_many_mutants(counter: Netlist, every: list[Mutant]) -> None
         selectable(counter, every[:1] * 65536)
 
 
+@pytest.mark.slow
 def test_equivalence_check_finds_differences_and_unreset_state(
     every: list[Mutant], equivalence: Equivalence
 ) -> None:

@@ -63,6 +63,7 @@ def test_cubesense_camera_is_idle_while_the_other_one_sends_and_stores(
     assert len(verdict.cubes) == 29 - len(verdict.refuted)
 
 
+@pytest.mark.slow
 def test_storing_is_not_idle() -> None:
     wiring = cubestar_wiring(CubeStarTop(COLUMNS, ROWS))
     (camera,) = wiring.cameras

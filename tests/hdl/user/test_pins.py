@@ -48,6 +48,7 @@ def test_text_does_not_depend_on_the_folder(tmp_path):
     assert rtlil_text(loaded(tmp_path, GOOD)) == rtlil_text(loaded(tmp_path / "other", GOOD))
 
 
+@pytest.mark.slow
 def test_parameter_changes_the_design(tmp_path):
     one, three = loaded(tmp_path, GOOD), loaded(tmp_path, GOOD, STEP=3)
     assert rtlil_text(one) != rtlil_text(three)

@@ -123,6 +123,7 @@ def test_calibration_from_exact_stars_finds_the_exact_camera() -> None:
     assert (fit.pictures, len(fit.places), fit.rejected) == (4, 60, 0)
 
 
+@pytest.mark.slow
 def test_sigma_matches_the_scatter_of_fits() -> None:
     fits = [fit_camera(sights(6, 0.05, seed=seed), GUESS) for seed in range(12)]
     assert np.mean([fit.after_px for fit in fits]) == pytest.approx(0.05 * np.sqrt(2), rel=0.15)

@@ -260,6 +260,7 @@ def _writes(node: ast.AST) -> bool:
     return name in ("write_text", "write_bytes") or opens
 
 
+@pytest.mark.slow
 def test_picture_renews_only_what_it_has_rendered(run: Run, tmp_path: Path) -> None:
     out, words = tmp_path / "p.png", ("--ra", "84", "--dec", "-1")
     assert run("picture", "aramis", *words, "--out", str(out)).code == 0

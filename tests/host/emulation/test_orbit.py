@@ -58,6 +58,7 @@ def test_scenes_follow_the_orbit(satellite: tuple[Any, Any, Any]) -> None:
         assert truth.vector == pytest.approx((0, 0, 1), abs=1e-4)
 
 
+@pytest.mark.slow
 def test_measurements_match_the_orbit(satellite: tuple[Any, Any, Any]) -> None:
     orbit, star, sense = satellite
     star.wait(60.0)

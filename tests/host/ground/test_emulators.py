@@ -44,6 +44,7 @@ def restart(served: Serving, body: object, token: str = TOKEN) -> tuple[int, Any
     return answer.status, json.loads(content)
 
 
+@pytest.mark.slow
 def test_restart_changes_the_profile_and_keeps_scene_and_seed(
     session: TargetSession, served: Serving
 ) -> None:

@@ -114,6 +114,7 @@ def test_other_memory_returns_the_same_directions(measure: Measure) -> None:
         assert another["error_deg"] == pytest.approx(one["error_deg"], abs=0.04)
 
 
+@pytest.mark.slow
 def test_sample_search_reads_fewer_pixels(measure: Measure) -> None:
     ways = ("lines", "samples", "stepping")
     lines, halves, stepping = (measure(*NADIR, *NOMINAL, "--search", way) for way in ways)

@@ -79,6 +79,7 @@ def test_driver_prints_the_documented_angles(folder: Path, sensor: None) -> None
     assert numbers == pytest.approx([20, 10, -8, 12], abs=0.2)
 
 
+@pytest.mark.slow
 def test_driver_tests_pass_and_detect_a_missing_retry(folder: Path, tmp_path: Path) -> None:
     assert "4 passed" in said_by_pytest(folder)
     worse = tmp_path / "worse"

@@ -114,6 +114,7 @@ def test_hanging_program_without_a_watchdog_stays_silent(star: AnyEmulated) -> N
     assert answer(star, b"h", timeout_s=3.0) == b""
 
 
+@pytest.mark.slow
 def test_polling_program_is_idle_after_a_while(star: AnyEmulated) -> None:
     star.wait(0.02)
     assert star.board.busy()  # it polls

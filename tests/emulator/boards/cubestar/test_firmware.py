@@ -51,6 +51,7 @@ def toggled(image: Image, **options: Any) -> tuple[list[int], Any, bytes, int]:
     return seen, violations, memory, board_time
 
 
+@pytest.mark.slow
 def test_fpga_behaves_the_same_by_driver_callbacks_and_simulation(images: dict[str, Image]) -> None:
     compiled = toggled(images["toggle"], engine="compiled")
     assert len(set(compiled[0])) > 20

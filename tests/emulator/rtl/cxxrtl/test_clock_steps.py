@@ -37,6 +37,7 @@ def steps(wiring: Wiring, text: str) -> str:
     return clock_steps(wiring, text, dict(members(text)), 0)
 
 
+@pytest.mark.slow
 def test_compiled_step_handles_the_release_of_reset(star):
     text = steps(*star)
     assert "in_reset(std::integral_constant<int, 0>) const { return p_pix__reset" in text

@@ -136,6 +136,7 @@ def random_factors(rng: np.random.Generator) -> list[float]:
             return [*changed, 1e-8 * rng.normal()]
 
 
+@pytest.mark.slow
 def test_lens_check_accepts_only_lenses_with_inverse_tables() -> None:
     rng = np.random.default_rng(54)
     verdicts: Counter[tuple[bool, bool]] = Counter()

@@ -89,6 +89,7 @@ def test_coded_catalogue_survives_flips_of_ram_without_reading_the_flash() -> No
     assert all(frame.phase_ms["check"] > 4 * check for frame in plain)
 
 
+@pytest.mark.slow
 def test_bit_flips_in_flash_are_counted() -> None:
     for frame in measure(bit_flips=3e-6, frames=2):
         assert 0 < frame.corrected <= frame.flips

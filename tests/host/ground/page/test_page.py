@@ -189,6 +189,7 @@ def test_time_goes_back_while_the_emulation_does_not_answer(page: Any) -> None:
     page.wait_for_selector("#summary >> text=/Time went back/")
 
 
+@pytest.mark.slow
 def test_two_tabs_share_the_state_and_show_different_targets(
     chromium: Any, address: str, page: Any
 ) -> None:
@@ -290,6 +291,7 @@ PLACES = """() => {
 """Top and bottom of what an operator needs at once."""
 
 
+@pytest.mark.slow
 def test_address_names_the_target_and_the_tab(chromium: Any, address: str) -> None:
     with shown(chromium, address) as page:
         assert "seed 5" in page.inner_text("#chosen")
@@ -314,6 +316,7 @@ def test_risky_command_asks_first(page: Any) -> None:
     page.wait_for_selector("#lines li.good >> text=write Reset")
 
 
+@pytest.mark.slow
 def test_paused_display_holds_its_values(chromium: Any, address: str, page: Any) -> None:
     page.click("#freeze")
     held = seconds(page)
@@ -351,6 +354,7 @@ def test_command_changes_the_device(kept: Any) -> None:
     kept.wait_for_selector("#plot canvas")
 
 
+@pytest.mark.slow
 def test_errors_are_shown_as_text(kept: Any) -> None:
     told = line(kept, "read <img/src=x/onerror=document.hacked=1>")
     assert "<img" in told

@@ -40,6 +40,7 @@ def test_out_needs_a_folder_and_a_place_in_its_page(run: Run, tmp_path: Path) ->
     assert (tmp_path / page.PAGE).read_text() == "# Mine\n"
 
 
+@pytest.mark.slow
 def test_renewed_rows_are_stored_with_what_they_depend_on(tmp_path: Path) -> None:
     job = Job("attitude", "cubestar", 2, 1)
     assert list(recorded.renewed(tmp_path, [job], 1)) == [job]

@@ -34,6 +34,7 @@ def test_pairs_are_those_of_the_firmware(cubestar: Catalogue) -> None:
     assert np.abs(own.angle - firmware.angle).max() < 1e-6
 
 
+@pytest.mark.slow
 def test_triangles_are_those_of_the_firmware(aramis: Catalogue) -> None:
     found, database = aramis.triangles, onboard_database()
     # Sides at the limit may fall on either of its sides.

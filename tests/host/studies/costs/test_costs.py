@@ -69,6 +69,7 @@ def test_cost_cases_match_the_recorded_builds_and_timings() -> None:
     assert [str(case.build) for case in _cases(["Os"], ["float"])] == ["-Os float"]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
 @pytest.mark.skipif(shutil.which(COMPILER) is None, reason=f"no {COMPILER}")
 def test_build_with_doubles_matches_the_recorded_costs() -> None:

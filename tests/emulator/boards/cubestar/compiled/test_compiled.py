@@ -107,6 +107,7 @@ def test_reports_faulting_and_unknown_calls(fast: Calls) -> None:
         fast.call("read_words", 1, 0x6000_0000)
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_fault_does_not_consume_stack_of_later_calls() -> None:
     calls = start_program(image("O2"), Timing())
