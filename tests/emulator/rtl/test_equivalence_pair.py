@@ -114,7 +114,7 @@ def test_pair_engines_agree_on_random_pin_events(seed):
     """With limits so wide that many writes and reads break them."""
     wiring = WIRINGS[seed % len(WIRINGS)]
     all_engines = engines(wiring, SramTiming(30_000, 20_000, 20_000, 30_000, 60_000))
-    outputs = assert_same_outputs(all_engines, random_events(np.random.default_rng(seed), 2000))
+    outputs = assert_same_outputs(all_engines, random_events(np.random.default_rng(seed), 4000))
     addresses = [wiring.output_pins.index(memory["A"]) for memory in wiring.memories]
     assert len(np.unique(outputs[:, addresses])) > 10
     assert len(all_engines[-1].violation_counts) >= 3

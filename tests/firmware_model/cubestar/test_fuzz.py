@@ -12,7 +12,7 @@ from .harness import Harness
 UART_BYTES = 40_000
 STREAM = INTERFACE.telecommand("StreamDownImage").id
 
-short_and_long = pytest.mark.parametrize("count", quick([1_000, 6_000], 1))
+short_and_long = pytest.mark.parametrize("count", quick([1_000, 10_000], 1))
 """Of frames, messages or transitions."""
 
 

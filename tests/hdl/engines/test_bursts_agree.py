@@ -20,7 +20,7 @@ from tests.tiers import quick_ones
 from .board_events import BOARDS
 
 SETTLED_PS = 1_000
-STEPS = 240
+STEPS = 400
 
 
 def levels(engine: RtlEngine) -> dict[str, object]:

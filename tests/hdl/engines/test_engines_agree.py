@@ -32,7 +32,7 @@ pytestmark = [
 ]
 
 SEEDS = range(12 if FULL else 2)
-END_PS = 80_000_000
+END_PS = 120_000_000
 
 
 class Case(NamedTuple):
