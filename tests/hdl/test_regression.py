@@ -54,6 +54,7 @@ def test_same_seed_repeats_the_simulation(verilog: Path, tmp_path: Path) -> None
     assert all(first[name] != other[name] for name in first)
 
 
+@pytest.mark.slow
 def test_tier_stops_at_the_first_failure(
     verilog: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

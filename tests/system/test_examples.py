@@ -134,6 +134,7 @@ def attitude_loop() -> Any:
     return SimpleNamespace(**runpy.run_path(str(HERE / "attitude_loop.py")))
 
 
+@pytest.mark.slow
 def test_attitude_loop_is_the_same_in_every_run(attitude_loop: Any) -> None:
     first, second = ([*attitude_loop.loop(faults=True, until_s=8.0)] for _ in range(2))
     assert repr(first) == repr(second)

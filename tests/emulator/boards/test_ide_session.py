@@ -215,6 +215,7 @@ def session(board: OwnFirmwareBoard, folder: Path, more: tuple[Action, ...]) -> 
     return dict(zip(parts[1::2], parts[2::2], strict=True))
 
 
+@pytest.mark.slow
 def test_every_action_of_a_session_has_its_effect(board: OwnFirmwareBoard, tmp_path: Path) -> None:
     more = (FPGA,) if isinstance(board, CubeStarFirmwareBoard) else ()
     said = session(board, tmp_path, more)

@@ -94,6 +94,7 @@ run_guest(sys.argv[1], sys.argv[2:], hz=1000, pace="real", streams=(None, None))
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("route", ROUTES)
 def test_call_fails_if_the_emulation_is_killed(program: Path, route: Route) -> None:
     """The program survives it, with the output of this process."""

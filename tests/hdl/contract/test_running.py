@@ -51,6 +51,7 @@ def test_shipped_design_fulfils_its_contract_and_reaches_all_points(
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_selected_tests_run_in_order_of_progress(tmp_path: Path) -> None:
     told: list[tuple[str, int, int]] = []
     report = run_checks(SHIPPED, text="rest", waves=tmp_path, told=lambda *call: told.append(call))

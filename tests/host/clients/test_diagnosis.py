@@ -19,7 +19,6 @@ from cubestack.host.errors import NoAnswerError, TargetError
 from cubestack.host.shell.language import Shell
 from cubestack.host.targets import open_target
 from cubestack.host.transport.streams import SerialTransport, open_transport
-from tests.tiers import quick
 
 from ..conftest import UartLink
 
@@ -72,7 +71,8 @@ def test_diagnosis_is_for_real_serial_lines_only(sense: object) -> None:
 
 @pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
 @pytest.mark.filterwarnings("ignore:set(Daemon|Name):DeprecationWarning")  # pyserial's
-@pytest.mark.parametrize("how", quick(["--strict-line --pty", "--rfc2217 0"], 1))
+@pytest.mark.slow
+@pytest.mark.parametrize("how", ["--strict-line --pty", "--rfc2217 0"])
 def test_finds_the_baud_rate(how: str, tmp_path: Path) -> None:
     words = how.split() + ([str(tmp_path / "tty")] if "pty" in how else [])
     with emulating(["cubesense", "--baud", "38400", *words]) as said:

@@ -242,6 +242,7 @@ def changes(text: str) -> vcd.Changes:
     return vcd.read(BytesIO(text.encode()))
 
 
+@pytest.mark.slow
 def test_control_api_traces_a_past_time_span(controlled: Controlled) -> None:
     controlled.run(1.0)
     controlled.act("fault", "processor-reset")

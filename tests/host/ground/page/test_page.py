@@ -239,7 +239,8 @@ def test_page_works_with_the_keyboard_only(page: Any) -> None:
     page.wait_for_selector("#pause[aria-pressed=false]")
 
 
-@pytest.mark.parametrize(("scheme", "width"), quick(LOOKS, 1))
+@pytest.mark.slow
+@pytest.mark.parametrize(("scheme", "width"), LOOKS)
 def test_page_has_no_overflow_overlap_or_low_contrast(
     chromium: Any, address: str, scheme: str, width: int
 ) -> None:

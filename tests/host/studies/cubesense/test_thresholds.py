@@ -11,6 +11,7 @@ from cubestack.host.experiments.opener import Opener
 from cubestack.host.studies.cubesense import thresholds
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(find_compiler() is None, reason="needs the compiled FPGA")
 def test_dynamic_threshold_takes_the_whole_image_and_loses_the_sun(
     monkeypatch: pytest.MonkeyPatch,
