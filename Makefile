@@ -35,7 +35,7 @@ MAKEFLAGS += --no-builtin-rules
 help:
 	@echo "make run       set up, then boot the sensors, measure over their serial ports, and draw what they saw"
 	@echo "make test      set up, then run the tests, but for those that take long"
-	@echo "make test-all  set up, then run those too that take long: this day's fourteenth; DAYS=1 runs all but weekly ones, DAYS=0 all"
+	@echo "make test-all  set up, then run those too that take long: this day's part of 28; DAYS=1 runs all but weekly ones, DAYS=0 all"
 	@echo "make fuzz      set up, then feed all readers of files and messages with documents that are nearly right"
 	@echo "make test-hdl  set up, then simulate the gateware: more than make test does, with coverage"
 	@echo "make test-clients  set up, install programs of others, then run them on the emulated ports"
@@ -79,7 +79,7 @@ test: .venv/ready-dev
 	@touch $@
 
 # Each slow test has its turn on one day in so many, a weekly one in seven at least; 0 runs all of them.
-DAYS ?= 14
+DAYS ?= 28
 
 test-all: .venv/ready-board .venv/ready-compiler
 	@$(PYTEST) $(TESTS) -m "slow or not slow" --days $(DAYS)

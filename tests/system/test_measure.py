@@ -176,6 +176,7 @@ def test_stellar_gyro_measures_the_rate_of_a_turning_sky(measure: Measure) -> No
     assert off["rate_deg_s"] is None
 
 
+@pytest.mark.slow
 def test_listed_planets_are_named_and_a_wrong_moon_is_refused(measure: Measure) -> None:
     options = ("--mag-limit", 3.8, "--frames", 4, "--seed", 1)
     planets = measure(

@@ -101,6 +101,7 @@ def test_server_returns_the_largest_transfer(served):
     assert i2c_socket.LENGTH.unpack_from(received)[0] == 4 + 42 * 8192
 
 
+@pytest.mark.slow
 def test_client_that_does_not_read_blocks_no_other(served):
     stuck, other = served.connect(), served.connect()
     for _ in range(3):

@@ -39,6 +39,7 @@ def equivalence(design: CounterAlone, counter: Netlist) -> Equivalence:
     return Equivalence(counter, design, {"rst": 1})
 
 
+@pytest.mark.slow
 def test_same_seed_gives_the_same_mutants(counter: Netlist, every: list[Mutant]) -> None:
     some = mutants(counter, 20, seed=3)
     assert some == mutants(counter, 20, seed=3)

@@ -104,6 +104,7 @@ def test_restart_runs_uploaded_firmware(session: TargetSession, served: Serving)
     assert (status, dict(told["rows"])["profile"]) == (200, "published")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("body", "status", "error"),
     [

@@ -79,6 +79,7 @@ def test_compiled_burst_changes_only_the_memory_of_the_storing_board():
         assert f"return {1 << own}u >> memory & 1;" in made, levels
 
 
+@pytest.mark.slow
 def test_unclocked_registers_become_inputs_of_the_compiled_step():
     wiring = cubestar_double_wiring(CubeStarDouble(32, 16))
     text = variant(wiring)

@@ -58,6 +58,7 @@ def test_image_is_sent_at_the_line_rate_with_at_most_two_chunks_waiting(
     assert node.now_us / 1e6 == pytest.approx(IMAGE_BYTES * BENCH_BYTE_US / 1e6, rel=0.02)
 
 
+@pytest.mark.slow
 def test_letters_are_answered_in_their_order(node: Links) -> None:
     answer = node.letters(b"qsaw")
     nadir, sun = node.pictures[Camera.NADIR].tobytes(), node.pictures[Camera.SUN].tobytes()

@@ -24,6 +24,7 @@ def test_tests_of_the_shipped_design_pass(tmp_path: Path, run: Run) -> None:
     assert case.get("name") == "bank_is_latched"
 
 
+@pytest.mark.slow
 def test_json_has_requirements_and_missed_points(tmp_path: Path, run: Run) -> None:
     arguments = ["--device", "cubestar", "-k", "without_a_camera", "--waves", tmp_path]
     found = json.loads(run("hdl", "test", *arguments, "--json").out)

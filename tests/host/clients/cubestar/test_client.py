@@ -120,6 +120,7 @@ def test_bodies_seen_returns_counts_and_the_disc(cubestar: CubeStar, node: Any) 
     assert seen.disc_apart_rad == pytest.approx(0.003)
 
 
+@pytest.mark.slow
 def test_download_image_reports_progress(cubestar: CubeStar, node: Any) -> None:
     node.memory[:] = np.random.default_rng(5).integers(0, 256, node.memory.size)
     seen: list[tuple[int, int]] = []

@@ -8,6 +8,7 @@ from cubestack.host.studies.aramis.stars_alone import CASES, PRINTED, outcomes, 
 POSES = 20
 
 
+@pytest.mark.slow
 def test_every_pose_ends_in_one_way_and_wrong_ones_a_field_off_are_wrong() -> None:
     found = stars_alone(None, POSES)
     for name in CASES:

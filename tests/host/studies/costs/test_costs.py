@@ -183,6 +183,7 @@ def test_missing_compiler_names_the_package(run: Run, monkeypatch: pytest.Monkey
     assert outcome.line.startswith("cubestack costs: arm-none-eabi-gcc is not installed: apt ")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(shutil.which(COMPILER) is None, reason=f"no {COMPILER}")
 def test_costs_command_measures_a_build(run: Run) -> None:
     outcome = run("costs", "measure", "--level", "Os", "--precision", "own", "--json")

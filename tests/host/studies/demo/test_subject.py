@@ -64,6 +64,7 @@ def errors_told(text: str) -> list[float]:
     return [float(size) for sizes in told for size in sizes if size]
 
 
+@pytest.mark.slow
 def test_cubestar_demo_solves_a_sky_and_a_photograph(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -62,6 +62,7 @@ def test_worst_strength_is_visible_and_repeatable(hazard: type[SensorHazard], ca
     assert np.mean(first != plain(camera)) > 1e-4
 
 
+@pytest.mark.slow
 @together("camera", CAMERAS)
 @together("name", sorted(HAZARDS.keys() - {"defocus", "response"}))
 def test_least_strength_has_no_effect(name: str, camera: str) -> None:
